@@ -1,0 +1,28 @@
+"""Equations of state, one file each. `ideal_gas.py` is the pattern to follow.
+
+All are linear in the specific internal energy, p = a(rho) + b(rho) e, so that nothing iterates. A member is a frozen
+dataclass (the host's side) whose class attributes name its device functions, each taking the device record first:
+
+* `pressure_offset(record, density)` -> a [Pa]
+* `pressure_slope(record, density)` -> b [kg/m3]
+* `sound_speed_squared(record, density, energy)` -> c^2 = (dp/drho)_s [m2/s2]
+* `Record`: the `wp.struct` they read; `record()` fills one.
+
+Energies are specific internal energies [J/kg] that contain the chemical energy.
+"""
+
+from typing import Any, Protocol
+
+import warp as wp
+
+
+class EquationOfState(Protocol):
+    """What a material asks of its equation of state."""
+
+    Record: type
+    pressure_offset: wp.Function
+    pressure_slope: wp.Function
+    sound_speed_squared: wp.Function
+
+    def record(self) -> Any:
+        """The device record of this equation of state."""

@@ -1,0 +1,273 @@
+"""The grid's part of the step: sums of the scatter into velocity, acceleration and field pressure (paper eq. 9).
+
+One thread owns a node and its ghosts behind walls (see `walls.py`), so nothing is written twice and the order of the
+sums is fixed. Ghost masses stay as they were scattered.
+"""
+
+import functools
+
+import warp as wp
+
+from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
+from warp_mpm.kernels.records import Clock, Grid, node_index, raise_maximum
+from warp_mpm.kernels.walls import (
+    Boundary,
+    free_components,
+    ghost_sides,
+    image_count,
+    image_node,
+    image_sides,
+    image_signs,
+    is_owner,
+    node_volume,
+    tally_reaction,
+)
+
+
+@wp.func
+def active_node(grid: Grid, index: int) -> wp.vec3i:
+    """The node of a flat index into the active nodes, ghosts included."""
+    count_y = grid.active_upper[1] - grid.active_lower[1] + 3
+    count_z = grid.active_upper[2] - grid.active_lower[2] + 3
+    row = index // count_z
+    return wp.vec3i(
+        row // count_y + grid.active_lower[0] - 1,
+        row % count_y + grid.active_lower[1] - 1,
+        index % count_z + grid.active_lower[2] - 1,
+    )
+
+
+@wp.kernel(enable_backward=False)
+def clear(grid: Grid, begin: int):
+    """Empty the active nodes."""
+    node = active_node(grid, begin + wp.tid())
+    n = node_index(grid, node[0], node[1], node[2])
+    grid.node[n] = vector8()
+    grid.pressure[n] = ZERO
+    grid.reprojected[n] = vector4()
+
+
+@wp.func
+def first_three(node: vector8) -> vector3:
+    """Momentum or velocity of a node."""
+    return vector3(node[0], node[1], node[2])
+
+
+@wp.func
+def second_three(node: vector8) -> vector3:
+    """Force or acceleration of a node."""
+    return vector3(node[4], node[5], node[6])
+
+
+@wp.func
+def beyond_face(grid: Grid, index: wp.vec3i) -> bool:
+    """Whether a node lies outside the domain."""
+    beyond = False
+    for axis in range(3):
+        if index[axis] < 0 or index[axis] > grid.cells[axis]:
+            beyond = True
+    return beyond
+
+
+@wp.func
+def fold(grid: Grid, boundary: Boundary, index: wp.vec3i, owned: wp.vec3i) -> vector8:
+    """Sum of a node and its ghosts, with the signs of their walls."""
+    total = vector8()
+    for i in range(image_count(owned[0])):
+        for j in range(image_count(owned[1])):
+            for k in range(image_count(owned[2])):
+                sides = image_sides(owned, i, j, k)
+                s = image_signs(boundary, sides)
+                x = grid.node[image_node(grid, index, sides)]
+                total += vector8(
+                    s[0] * x[0], s[1] * x[1], s[2] * x[2], x[3], s[0] * x[4], s[1] * x[5], s[2] * x[6], x[7]
+                )
+    return total
+
+
+@wp.func
+def fold_pressure(grid: Grid, index: wp.vec3i, owned: wp.vec3i) -> scalar:
+    """Sum of sum w V p [J] of a node and its ghosts."""
+    total = ZERO
+    for i in range(image_count(owned[0])):
+        for j in range(image_count(owned[1])):
+            for k in range(image_count(owned[2])):
+                total += grid.pressure[image_node(grid, index, image_sides(owned, i, j, k))]
+    return total
+
+
+@wp.func
+def tally_walls(
+    grid: Grid,
+    boundary: Boundary,
+    index: wp.vec3i,
+    owned: wp.vec3i,
+    force: bool,
+    share: scalar,
+    value: vector3,
+    reactions: wp.array(dtype=wp.float64),
+    slot: int,
+):
+    """Tally what walls add to a node and its ghosts: of the forces, or of a share of the momenta."""
+    for i in range(image_count(owned[0])):
+        for j in range(image_count(owned[1])):
+            for k in range(image_count(owned[2])):
+                sides = image_sides(owned, i, j, k)
+                x = grid.node[image_node(grid, index, sides)]
+                mass = x[3]
+                scattered = first_three(x)
+                body = vector3()
+                if force:
+                    scattered = second_three(x)
+                    body = mass * boundary.gravity
+                tally_reaction(
+                    boundary, grid, index, sides, share * scattered, body, share * mass * value, reactions, slot
+                )
+
+
+@wp.func
+def mirror(
+    grid: Grid,
+    boundary: Boundary,
+    index: wp.vec3i,
+    owned: wp.vec3i,
+    velocity: vector3,
+    acceleration: vector3,
+    filling: scalar,
+    pressure: scalar,
+):
+    """Write a node's values into its ghosts."""
+    for i in range(image_count(owned[0])):
+        for j in range(image_count(owned[1])):
+            for k in range(image_count(owned[2])):
+                if i + j + k > 0:
+                    sides = image_sides(owned, i, j, k)
+                    s = image_signs(boundary, sides)
+                    m = image_node(grid, index, sides)
+                    v = wp.cw_mul(s, velocity)
+                    a = wp.cw_mul(s, acceleration)
+                    grid.node[m] = vector8(v[0], v[1], v[2], grid.node[m][3], a[0], a[1], a[2], filling)
+                    grid.pressure[m] = pressure
+
+
+@functools.cache
+def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
+    """Sums of the scatter -> values: v = P / M, a = f / M + g; filling = V / V_i, p = sum w V p / max(V, V_i).
+
+    `momentum` solves the first, `force` the second (all at once but for USF, whose forces come later). Tallies what
+    walls add: `reactions` to forces [N], `impulses` to momenta [kg m/s], the latter for PIC and APIC, whose particles
+    take the nodes' velocity over with a share of `pic_share`. The highest pressure of nodes at least half filled
+    inside the domain goes to `peaks`.
+    """
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def solve(
+        grid: Grid,
+        boundary: Boundary,
+        pic_share: scalar,
+        reactions: wp.array(dtype=wp.float64),
+        impulses: wp.array(dtype=wp.float64),
+        peaks: wp.array(dtype=scalar),
+        slot: int,
+        begin: int,
+    ):
+        index = active_node(grid, begin + wp.tid())
+        if not is_owner(boundary, grid.cells, index):
+            return
+        n = node_index(grid, index[0], index[1], index[2])
+        own = grid.node[n]
+        total = own
+        energy = grid.pressure[n]
+        owned = ghost_sides(boundary, grid.cells, index)
+        free = free_components(boundary, grid.cells, index)
+        ghosts = owned[0] + owned[1] + owned[2] > 0
+        if ghosts:
+            total = fold(grid, boundary, index, owned)
+            energy = fold_pressure(grid, index, owned)
+        mass = total[3]
+        filling = total[7] / node_volume(grid, index)
+        velocity = first_three(own)
+        if wp.static(not momentum):  # solved before the forces came
+            mass = own[3]
+            filling = own[7]
+        inverse = wp.where(mass > grid.light_mass, ONE / mass, ZERO)
+        if wp.static(momentum):
+            velocity = wp.cw_mul(free, first_three(total)) * inverse
+        acceleration = vector3()
+        pressure = ZERO
+        if wp.static(force) and mass > grid.light_mass:
+            acceleration = wp.cw_mul(free, second_three(total) * inverse + boundary.gravity)
+            pressure = energy / (node_volume(grid, index) * wp.max(filling, ONE))
+            if not beyond_face(grid, index):
+                if filling >= HALF:
+                    raise_maximum(peaks, slot, pressure)
+            elif filling > ZERO:
+                pressure = energy / (node_volume(grid, index) * filling)
+        if ghosts or free[0] * free[1] * free[2] == ZERO:
+            if wp.static(force):
+                tally_walls(grid, boundary, index, owned, True, ONE, acceleration, reactions, slot)
+            if wp.static(momentum) and pic_share > ZERO:
+                tally_walls(grid, boundary, index, owned, False, pic_share, velocity, impulses, slot)
+            mirror(grid, boundary, index, owned, velocity, acceleration, filling, pressure)
+        grid.node[n] = vector8(
+            velocity[0], velocity[1], velocity[2], mass, acceleration[0], acceleration[1], acceleration[2], filling
+        )
+        grid.pressure[n] = pressure
+
+    return solve
+
+
+@wp.func
+def fold_reprojected(grid: Grid, boundary: Boundary, index: wp.vec3i, owned: wp.vec3i) -> vector4:
+    """Sum of a node's re-projected momentum and kinetic energy and those of its ghosts."""
+    total = vector4()
+    for i in range(image_count(owned[0])):
+        for j in range(image_count(owned[1])):
+            for k in range(image_count(owned[2])):
+                sides = image_sides(owned, i, j, k)
+                s = image_signs(boundary, sides)
+                x = grid.reprojected[image_node(grid, index, sides)]
+                total += vector4(s[0] * x[0], s[1] * x[1], s[2] * x[2], x[3])
+    return total
+
+
+@wp.kernel(enable_backward=False)
+def solve_reprojected(
+    grid: Grid,
+    boundary: Boundary,
+    clock: wp.array(dtype=Clock),
+    impulses: wp.array(dtype=wp.float64),
+    slot: int,
+    begin: int,
+):
+    """Re-projected sums -> velocity v_r and the damping's heat H = alpha (sum w m v^2 / 2 / M - |v_r|^2 / 2) >= 0."""
+    index = active_node(grid, begin + wp.tid())
+    if not is_owner(boundary, grid.cells, index):
+        return
+    n = node_index(grid, index[0], index[1], index[2])
+    alpha = clock[0].damping
+    mass = grid.node[n][3]
+    owned = ghost_sides(boundary, grid.cells, index)
+    free = free_components(boundary, grid.cells, index)
+    total = grid.reprojected[n]
+    if owned[0] + owned[1] + owned[2] > 0:
+        total = fold_reprojected(grid, boundary, index, owned)
+    inverse = wp.where(mass > grid.light_mass, ONE / mass, ZERO)
+    velocity = wp.cw_mul(free, vector3(total[0], total[1], total[2])) * inverse
+    heat = alpha * wp.max(total[3] * inverse - HALF * wp.dot(velocity, velocity), ZERO)
+    near_wall = owned[0] + owned[1] + owned[2] > 0 or free[0] * free[1] * free[2] == ZERO
+    if near_wall:
+        for i in range(image_count(owned[0])):
+            for j in range(image_count(owned[1])):
+                for k in range(image_count(owned[2])):
+                    sides = image_sides(owned, i, j, k)
+                    m = image_node(grid, index, sides)
+                    x = grid.reprojected[m]
+                    image_mass = grid.node[m][3]
+                    momentum = alpha * vector3(x[0], x[1], x[2])
+                    value = alpha * image_mass * velocity
+                    tally_reaction(boundary, grid, index, sides, momentum, vector3(), value, impulses, slot)
+                    s = image_signs(boundary, sides)
+                    v = wp.cw_mul(s, velocity)
+                    grid.reprojected[m] = vector4(v[0], v[1], v[2], heat)
+    grid.reprojected[n] = vector4(velocity[0], velocity[1], velocity[2], heat)

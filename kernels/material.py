@@ -1,0 +1,369 @@
+"""The material update: strain from the grid, then density, energy, burn fraction and pressure.
+
+Composed from equation of state x burn law x shape x order of the step. The energy update conserves the total energy
+identically for FLIP with MUSL: the particles' kinetic energy changes by dt sum f . w with w = (v^n + v_r) / 2, v_r the
+re-projected velocity, so e loses (p + q)^n V^n dt div w, the very pressures and volumes of the force.
+
+The conservative damping moves a particle's velocity vF by alpha of its distance u = sum w (v_r - vF) from what the
+grid sees, and returns the kinetic energy as heat: the node's share H (see `grid.py`) and
+alpha / 2 (sum w |v_r - vF|^2 - alpha |u|^2), both non-negative. For momentum to be exact, alpha is one number a step.
+"""
+
+import functools
+from enum import Enum
+from typing import Any
+
+import warp as wp
+
+from warp_mpm.kernels.motion import Faces, place, tally_outflow
+from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
+from warp_mpm.kernels.records import (
+    AMBIENT_WORK,
+    CLAMPED_ENERGY,
+    TALLIES,
+    Clock,
+    Grid,
+    Maxima,
+    Particles,
+    raise_maxima,
+)
+from warp_mpm.kernels.shape import Shape
+from warp_mpm.kernels.transfer import stencil_functions
+from warp_mpm.kernels.vectors import multiply_add4, multiply_add8
+from warp_mpm.kernels.viscosity import Viscosity, viscous_pressure, viscous_rate
+
+RELAXATION = wp.constant(scalar(0.1))  # of the density towards full nodes, per cell that sound crosses
+FILLED = wp.constant(scalar(0.95))  # nodes fuller than this relax fully
+SPARSE = wp.constant(scalar(0.80))  # nodes emptier than this, at a free surface, not at all
+
+
+class Strain(Enum):
+    """Which nodal velocity strains the material, and which one does the work."""
+
+    REPROJECTED = "re-projected; work on (v^n + v_r) / 2"
+    END = "v^n + dt a; work on v^n + dt a / 2"
+    START = "v^n for both"
+
+
+@wp.struct
+class StrainIncrement:
+    """What the gather brings to the material update."""
+
+    motion: vector3  # sum w (v^n + dt a), the velocity that moves the particle [m/s]
+    divergence: scalar  # div v [1/s]
+    work_divergence: scalar  # div of the velocity that does the work [1/s]
+    slip: vector3  # u = sum w (v_r - vF) [m/s]
+    slip_squared: scalar  # sum w |v_r - vF|^2 [m2/s2]
+    heat: scalar  # sum w H [J/kg]
+    filling: scalar  # sum w (filling of the node)
+
+
+@functools.cache
+def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
+    """Device function: gather the strain increment of a particle."""
+    width = shape.width
+    first_node, weights, slopes, _ = stencil_functions(shape)
+    reprojected = strain is Strain.REPROJECTED
+    end = strain is Strain.END
+
+    @wp.func
+    def gather_strain(
+        grid: Grid, cell: wp.vec3s, fraction: vector3, velocity: vector3, half_width: scalar, dt: scalar
+    ) -> StrainIncrement:
+        first = first_node(grid, cell, fraction)
+        wx = weights(fraction[0], half_width)
+        wy = weights(fraction[1], half_width)
+        wz = weights(fraction[2], half_width)
+        sx = slopes(fraction[0], half_width) / grid.spacing[0]
+        sy = slopes(fraction[1], half_width) / grid.spacing[1]
+        sz = slopes(fraction[2], half_width) / grid.spacing[2]
+        sums = vector8()  # sum w (nodal values)
+        nodal_sums = vector4()  # sum w (re-projected values)
+        slip_squared = ZERO
+        divergence = ZERO  # of v^n
+        second_divergence = ZERO  # of the re-projected velocity or of the acceleration
+        for i in range(width):
+            for j in range(width):
+                row = first + i * grid.stride_x + j * grid.stride_y
+                wij = wx[i] * wy[j]
+                gx = sx[i] * wy[j]
+                gy = wx[i] * sy[j]
+                row_sums = vector8()
+                row_nodal = vector4()
+                row_squared = ZERO
+                slope = ZERO
+                second_slope = ZERO
+                for k in range(width):
+                    node = grid.node[row + k]
+                    row_sums = multiply_add8(row_sums, wz[k], node)
+                    slope += sz[k] * node[2]
+                    if wp.static(reprojected):
+                        nodal = grid.reprojected[row + k]
+                        row_nodal = multiply_add4(row_nodal, wz[k], nodal)
+                        second_slope += sz[k] * nodal[2]
+                        if wp.static(damped):
+                            relative = vector3(nodal[0], nodal[1], nodal[2]) - velocity
+                            row_squared += wz[k] * wp.dot(relative, relative)
+                    if wp.static(end):
+                        second_slope += sz[k] * node[6]
+                sums = multiply_add8(sums, wij, row_sums)
+                nodal_sums = multiply_add4(nodal_sums, wij, row_nodal)
+                slip_squared += wij * row_squared
+                divergence += gx * row_sums[0] + gy * row_sums[1] + wij * slope
+                if wp.static(reprojected):
+                    second_divergence += gx * row_nodal[0] + gy * row_nodal[1] + wij * second_slope
+                if wp.static(end):
+                    second_divergence += gx * row_sums[4] + gy * row_sums[5] + wij * second_slope
+        result = StrainIncrement()
+        result.motion = vector3(sums[0], sums[1], sums[2]) + dt * vector3(sums[4], sums[5], sums[6])
+        result.divergence = divergence
+        result.work_divergence = divergence
+        if wp.static(reprojected):
+            result.divergence = second_divergence
+            result.work_divergence = HALF * (divergence + second_divergence)
+        if wp.static(end):
+            result.divergence = divergence + dt * second_divergence
+            result.work_divergence = divergence + HALF * dt * second_divergence
+        result.slip = vector3(nodal_sums[0], nodal_sums[1], nodal_sums[2]) - velocity
+        result.slip_squared = slip_squared
+        result.heat = nodal_sums[3]
+        result.filling = sums[7]
+        return result
+
+    return gather_strain
+
+
+@wp.struct
+class Response:
+    """What a particle answers with."""
+
+    burn_fraction: scalar
+    pressure: scalar  # [Pa]
+    viscous_pressure: scalar  # [Pa]
+    sound_speed: scalar  # of the products [m/s]
+
+
+@functools.cache
+def response_function(eos: Any, burn: Any) -> wp.Function:
+    """Device function: burn fraction, pressure, viscous pressure and sound speed from density and energy.
+
+    `eos` is a class of `eos/`, `burn` a class of `burn/` or None.
+    """
+    pressure_offset, pressure_slope = eos.pressure_offset, eos.pressure_slope
+    sound_speed_squared = eos.sound_speed_squared
+    eos_record = eos.Record
+    burns = burn is not None
+    burn_record = burn.Record if burns else wp.int32
+    burn_fraction = burn.burn_fraction if burns else None
+
+    @wp.func
+    def respond(
+        eos_parameters: eos_record,
+        burn_parameters: burn_record,
+        viscosity: Viscosity,
+        density: scalar,
+        energy: scalar,
+        divergence: scalar,
+        burnt_before: scalar,
+        since_arrival: scalar,
+        since_booster: scalar,
+    ) -> Response:
+        result = Response()
+        burnt = ONE
+        if wp.static(burns):
+            burnt = burn_fraction(burn_parameters, burnt_before, since_arrival, since_booster, density)
+        products = pressure_offset(eos_parameters, density) + pressure_slope(eos_parameters, density) * energy
+        result.burn_fraction = burnt
+        result.pressure = burnt * products
+        result.sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
+        if burnt > ZERO:
+            result.viscous_pressure = viscous_pressure(viscosity, density, result.sound_speed, divergence)
+        return result
+
+    return respond
+
+
+@wp.func
+def rates(
+    response: Response, viscosity: Viscosity, velocity: vector3, divergence: scalar, burn_speed: scalar, moved: scalar
+) -> Maxima:
+    """What limits the next time step, and health figures; `burn_speed` is that of matter not yet burnt, else 0."""
+    sound_speed = response.sound_speed
+    viscous = ZERO
+    if response.burn_fraction > ZERO:
+        viscous = viscous_rate(viscosity, sound_speed, divergence)
+    return Maxima(
+        sound_speed + wp.abs(velocity[0]),
+        sound_speed + wp.abs(velocity[1]),
+        sound_speed + wp.abs(velocity[2]),
+        sound_speed + wp.length(velocity),
+        burn_speed,
+        viscous,
+        wp.abs(divergence),
+        moved,
+        response.pressure,
+    )
+
+
+@functools.cache
+def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
+    """Burn fraction, pressure and rates at the start, from the initial density and energy."""
+    respond = response_function(eos, burn)
+    eos_record = eos.Record
+    burns = burn is not None
+    burn_record = burn.Record if burns else wp.int32
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def initialise(
+        particles: Particles,
+        eos_parameters: eos_record,
+        burn_parameters: burn_record,
+        viscosity: Viscosity,
+        maxima: wp.array(dtype=Maxima),
+        slab: int,
+        begin: int,
+    ):
+        p = begin + wp.tid()
+        since_arrival = ZERO
+        since_booster = ZERO
+        if wp.static(burns):
+            since_arrival = -particles.arrival_time[p]
+            since_booster = -particles.booster_time[p]
+        density = particles.density[p]
+        energy = particles.energy[p]
+        response = respond(
+            eos_parameters, burn_parameters, viscosity, density, energy, ZERO, ZERO, since_arrival, since_booster
+        )
+        particles.pressure[p] = response.pressure
+        burn_speed = ZERO
+        if wp.static(burns):
+            particles.burn_fraction[p] = response.burn_fraction
+            if response.burn_fraction < ONE:
+                burn_speed = burn_parameters.detonation_speed
+        values = rates(response, viscosity, particles.velocity[p], ZERO, burn_speed, ZERO)
+        raise_maxima(maxima, slab, values)
+
+    return initialise
+
+
+@wp.func
+def damping_heat(strain: StrainIncrement, alpha: scalar) -> scalar:
+    """Heat that the damping leaves in a particle [J/kg]: the nodes' share, and its own slip against them."""
+    spread = wp.max(strain.slip_squared - alpha * wp.dot(strain.slip, strain.slip), ZERO)
+    return strain.heat + HALF * alpha * spread
+
+
+@wp.func
+def relax_density(density: scalar, filling: scalar, crossing: scalar) -> scalar:
+    """Relax a volume to what the nodes have room for: rho J^(a / (1 + a)), a = 0.1 dt c / h, not at free surfaces."""
+    rate = RELAXATION * crossing * wp.clamp((filling - SPARSE) / (FILLED - SPARSE), ZERO, ONE)
+    return density * wp.pow(wp.max(filling, HALF), rate / (ONE + rate))
+
+
+@functools.cache
+def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: Any, burn: Any) -> wp.Kernel:
+    """Strain, energy, density, damping, motion (`move`), then burn fraction and pressure for the next forces."""
+    gather_strain = strain_function(shape, strain, damped)
+    respond = response_function(eos, burn)
+    sound_speed_squared = eos.sound_speed_squared
+    eos_record = eos.Record
+    burns = burn is not None
+    burn_record = burn.Record if burns else wp.int32
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def update(
+        particles: Particles,
+        grid: Grid,
+        faces: Faces,
+        clock: wp.array(dtype=Clock),
+        eos_parameters: eos_record,
+        burn_parameters: burn_record,
+        viscosity: Viscosity,
+        half_width: scalar,
+        ambient_pressure: scalar,
+        maxima: wp.array(dtype=Maxima),
+        tallies: wp.array(dtype=wp.float64),
+        faults: wp.array(dtype=int),
+        slab: int,
+        begin: int,
+    ):
+        p = begin + wp.tid()
+        mass = particles.mass[p]
+        if mass == ZERO:
+            return
+        dt = clock[0].dt
+        alpha = clock[0].damping
+        cell = particles.cell[p]
+        fraction = particles.fraction[p]
+        velocity = particles.velocity[p]
+        strained = gather_strain(grid, cell, fraction, velocity, half_width, dt)
+
+        # Energy: the work of the very pressures of the force, and the heat of the damping.
+        expansion = dt * strained.work_divergence / particles.density[p]
+        energy = particles.energy[p] - (particles.pressure[p] + particles.viscous_pressure[p]) * expansion
+        if ambient_pressure != ZERO:
+            work = wp.float64(ambient_pressure) * wp.float64(expansion) * wp.float64(mass)
+            wp.atomic_add(tallies, slab * TALLIES + AMBIENT_WORK, work)
+        if wp.static(damped):
+            energy += damping_heat(strained, alpha)
+            velocity += alpha * strained.slip
+            particles.velocity[p] = velocity
+        if energy < ZERO:
+            wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
+            energy = ZERO
+
+        # Density follows the strain, and in full nodes relaxes to the room there is.
+        density = particles.density[p] / (ONE + dt * strained.divergence)
+        burnt = ONE
+        if wp.static(burns):
+            burnt = particles.burn_fraction[p]
+        if wp.static(damped) and burnt >= ONE:
+            sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
+            density = relax_density(density, strained.filling, dt * sound_speed / viscosity.length)
+
+        moved = ZERO
+        if wp.static(move):
+            step = wp.cw_div(dt * strained.motion, grid.spacing)
+            after = place(grid.cells, grid.active_lower, grid.active_upper, faces, cell, fraction, step)
+            moved = after.moved
+            if after.fault:
+                wp.atomic_max(faults, slab, particles.index[p] + 1)
+            elif after.left_through >= 0:
+                tally_outflow(mass, velocity, energy, after.left_through, slab, tallies)
+                particles.mass[p] = ZERO
+                particles.pressure[p] = ZERO
+                particles.viscous_pressure[p] = ZERO
+                return
+            else:
+                particles.cell[p] = wp.vec3s(wp.int16(after.cell[0]), wp.int16(after.cell[1]), wp.int16(after.cell[2]))
+                particles.fraction[p] = after.fraction
+
+        # Burn fraction and pressures for the next forces.
+        since_arrival = ZERO
+        since_booster = ZERO
+        if wp.static(burns):
+            since_arrival = scalar(clock[0].time - wp.float64(particles.arrival_time[p]))
+            since_booster = scalar(clock[0].time - wp.float64(particles.booster_time[p]))
+        response = respond(
+            eos_parameters,
+            burn_parameters,
+            viscosity,
+            density,
+            energy,
+            strained.divergence,
+            burnt,
+            since_arrival,
+            since_booster,
+        )
+        particles.density[p] = density
+        particles.energy[p] = energy
+        particles.pressure[p] = response.pressure
+        particles.viscous_pressure[p] = response.viscous_pressure
+        burn_speed = ZERO
+        if wp.static(burns):
+            particles.burn_fraction[p] = response.burn_fraction
+            if response.burn_fraction < ONE:
+                burn_speed = burn_parameters.detonation_speed
+        raise_maxima(maxima, slab, rates(response, viscosity, velocity, strained.divergence, burn_speed, moved))
+
+    return update

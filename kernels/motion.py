@@ -1,0 +1,157 @@
+"""Where particles go: displacement, walls, and the faces through which they leave."""
+
+import functools
+
+import warp as wp
+
+from warp_mpm.kernels.precision import HALF, ZERO, scalar, vector3
+from warp_mpm.kernels.records import (
+    DISPLACEMENT,
+    OUTFLOW_LANES,
+    OUTFLOW_MASS,
+    TALLIES,
+    Clock,
+    Grid,
+    Maxima,
+    Particles,
+    raise_maxima,
+)
+from warp_mpm.kernels.shape import Shape
+from warp_mpm.kernels.transfer import displacement_function
+
+FARTHEST = wp.constant(scalar(4.0))  # cells that a particle may move in one step; more, or NaN, is a fault
+LAST_FRACTION = wp.constant(scalar(0.99999994))  # the largest number below one in single precision
+
+
+@wp.struct
+class Faces:
+    """Which faces of the domain are open, in the order x low, x high, y low, y high, z low, z high."""
+
+    open: wp.types.vector(6, wp.int32)
+
+
+@wp.func
+def face_crossed(cell: wp.vec3i, cells: wp.vec3i, faces: Faces) -> int:
+    """The open face behind which a cell lies, or -1."""
+    face = -1
+    for axis in range(3):
+        if cell[axis] < 0 and faces.open[2 * axis] != 0:
+            face = 2 * axis
+        if cell[axis] >= cells[axis] and faces.open[2 * axis + 1] != 0:
+            face = 2 * axis + 1
+    return face
+
+
+@wp.func
+def tally_outflow(
+    mass: scalar, velocity: vector3, energy: scalar, face: int, slab: int, tallies: wp.array(dtype=wp.float64)
+):
+    """Add the mass, momentum and energy of a particle that leaves to the tallies of its face."""
+    lane = slab * TALLIES + face * OUTFLOW_LANES + OUTFLOW_MASS
+    specific = wp.float64(energy) + wp.float64(HALF) * wp.float64(wp.dot(velocity, velocity))
+    wp.atomic_add(tallies, lane, wp.float64(mass))
+    for axis in range(3):
+        wp.atomic_add(tallies, lane + 1 + axis, wp.float64(mass) * wp.float64(velocity[axis]))
+    wp.atomic_add(tallies, lane + 4, wp.float64(mass) * specific)
+
+
+@wp.struct
+class Place:
+    """Where a particle is after a step."""
+
+    cell: wp.vec3i
+    fraction: vector3
+    moved: scalar  # its longest way along an axis [cells]
+    left_through: int  # the open face through which it left, or -1
+    fault: bool  # it moved absurdly far, or out of the active cells
+
+
+@wp.func
+def place(
+    cells: wp.vec3i,
+    active_lower: wp.vec3i,
+    active_upper: wp.vec3i,
+    faces: Faces,
+    old_cell: wp.vec3s,
+    old_fraction: vector3,
+    displacement: vector3,
+) -> Place:
+    """Move a particle by `displacement` [cells]; every particle's stencil is tested here, every step.
+
+    A mirror wall cannot be crossed but by round-off, which puts the particle back on the wall. A particle outside the
+    active cells, where its stencil would write outside the arrays, is a fault.
+    """
+    result = Place()
+    result.left_through = -1
+    result.moved = wp.max(wp.abs(displacement[0]), wp.max(wp.abs(displacement[1]), wp.abs(displacement[2])))
+    if not (result.moved < FARTHEST):  # also true for NaN
+        result.moved = ZERO
+        result.fault = True
+        return result
+    fraction = old_fraction + displacement
+    below = vector3(wp.floor(fraction[0]), wp.floor(fraction[1]), wp.floor(fraction[2]))
+    fraction = fraction - below
+    cell = wp.vec3i(int(old_cell[0]), int(old_cell[1]), int(old_cell[2]))
+    cell = cell + wp.vec3i(int(below[0]), int(below[1]), int(below[2]))
+    # A tiny negative number plus one rounds to one.
+    last = vector3(LAST_FRACTION, LAST_FRACTION, LAST_FRACTION)
+    fraction = wp.min(fraction, last)
+    outside = cell[0] < 0 or cell[1] < 0 or cell[2] < 0
+    outside = outside or cell[0] >= cells[0] or cell[1] >= cells[1] or cell[2] >= cells[2]
+    if outside:
+        result.left_through = face_crossed(cell, cells, faces)
+        for axis in range(3):
+            if cell[axis] < 0:
+                fraction[axis] = ZERO
+            if cell[axis] >= cells[axis]:
+                fraction[axis] = LAST_FRACTION
+        cell = wp.max(wp.min(cell, cells - wp.vec3i(1, 1, 1)), wp.vec3i(0, 0, 0))
+    result.cell = cell
+    result.fraction = fraction
+    inside = cell[0] >= active_lower[0] and cell[1] >= active_lower[1] and cell[2] >= active_lower[2]
+    inside = inside and cell[0] < active_upper[0] and cell[1] < active_upper[1] and cell[2] < active_upper[2]
+    result.fault = not inside
+    return result
+
+
+@functools.cache
+def move_kernel(shape: Shape) -> wp.Kernel:
+    """Move the particles with the grid (for USF, whose material update comes before the forces)."""
+    displacement = displacement_function(shape)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def move(
+        particles: Particles,
+        grid: Grid,
+        faces: Faces,
+        clock: wp.array(dtype=Clock),
+        half_width: scalar,
+        maxima: wp.array(dtype=Maxima),
+        tallies: wp.array(dtype=wp.float64),
+        faults: wp.array(dtype=int),
+        slab: int,
+        begin: int,
+    ):
+        p = begin + wp.tid()
+        mass = particles.mass[p]
+        if mass == ZERO:
+            return
+        cell = particles.cell[p]
+        fraction = particles.fraction[p]
+        step = displacement(grid, cell, fraction, half_width, clock[0].dt)
+        after = place(grid.cells, grid.active_lower, grid.active_upper, faces, cell, fraction, step)
+        moved = Maxima()
+        moved[DISPLACEMENT] = after.moved
+        raise_maxima(maxima, slab, moved)
+        if after.fault:
+            wp.atomic_max(faults, slab, particles.index[p] + 1)
+        elif after.left_through >= 0:
+            tally_outflow(mass, particles.velocity[p], particles.energy[p], after.left_through, slab, tallies)
+            particles.mass[p] = ZERO
+            particles.pressure[p] = ZERO
+            particles.viscous_pressure[p] = ZERO
+        else:
+            particles.cell[p] = wp.vec3s(wp.int16(after.cell[0]), wp.int16(after.cell[1]), wp.int16(after.cell[2]))
+            particles.fraction[p] = after.fraction
+
+    return move

@@ -1,0 +1,74 @@
+"""The order of particles in memory: by slab, charge and cell, so that neighbours on the grid are neighbours there."""
+
+from typing import Any
+
+import warp as wp
+
+from warp_mpm.kernels.precision import ZERO
+from warp_mpm.kernels.records import Grid, Particles
+
+
+@wp.struct
+class Slabs:
+    """How the domain is cut into slabs of whole cells."""
+
+    axis: int
+    thickness: int  # cells
+    charges: int
+
+
+@wp.kernel(enable_backward=False)
+def sort_keys(
+    particles: Particles,
+    grid: Grid,
+    slabs: Slabs,
+    charge: wp.array(dtype=wp.int16),
+    keys: wp.array(dtype=wp.int64),
+    order: wp.array(dtype=int),
+):
+    """Key of each particle: (slab x charges + charge) x cells + cell. Particles that left come last."""
+    p = wp.tid()
+    cell = particles.cell[p]
+    cells = wp.int64(grid.cells[0]) * wp.int64(grid.cells[1]) * wp.int64(grid.cells[2])
+    flat = (wp.int64(cell[0]) * wp.int64(grid.cells[1]) + wp.int64(cell[1])) * wp.int64(grid.cells[2])
+    flat = flat + wp.int64(cell[2])
+    slab = int(cell[slabs.axis]) // slabs.thickness
+    if particles.mass[p] == ZERO:
+        slab = grid.cells[slabs.axis] // slabs.thickness + 1
+    keys[p] = (wp.int64(slab) * wp.int64(slabs.charges) + wp.int64(charge[particles.index[p]])) * cells + flat
+    order[p] = p
+
+
+@wp.kernel(enable_backward=False)
+def group_starts(keys: wp.array(dtype=wp.int64), count: int, cells: wp.int64, starts: wp.array(dtype=int)):
+    """First particle of each (slab, charge), for sorted keys; groups without particles start where the next does."""
+    p = wp.tid()
+    groups = starts.shape[0] - 1
+    group = groups
+    if p < count:
+        group = wp.min(int(keys[p] // cells), groups)
+    previous = -1
+    if p > 0:
+        previous = wp.min(int(keys[p - 1] // cells), groups)
+    for g in range(previous + 1, group + 1):
+        starts[g] = p
+
+
+@wp.kernel(enable_backward=False)
+def permute(source: wp.array(dtype=Any), order: wp.array(dtype=int), target: wp.array(dtype=Any)):
+    """target[p] = source[order[p]]."""
+    p = wp.tid()
+    target[p] = source[order[p]]
+
+
+@wp.kernel(enable_backward=False)
+def cell_bounds(particles: Particles, bounds: wp.array(dtype=int)):
+    """Lowest cell (bounds 0 to 2) and highest cell (3 to 5) that holds a particle, per axis."""
+    p = wp.tid()
+    if particles.mass[p] > ZERO:
+        cell = particles.cell[p]
+        for axis in range(3):
+            if int(cell[axis]) < bounds[axis]:
+                wp.atomic_min(bounds, axis, int(cell[axis]))
+            if int(cell[axis]) > bounds[3 + axis]:
+                wp.atomic_max(bounds, 3 + axis, int(cell[axis]))

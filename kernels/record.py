@@ -1,0 +1,77 @@
+"""The record that every step leaves: time, peaks, the pressure in regions and along a line."""
+
+import warp as wp
+
+from warp_mpm.kernels.precision import HALF, ZERO, scalar, vector3
+from warp_mpm.kernels.records import PARTICLE_PRESSURE, Clock, Grid, Maxima
+
+# Lanes at the start of a record's row; regions and points of the line follow.
+RECORD_DT = 0  # [s]
+RECORD_PARTICLE_PRESSURE = 1  # highest pressure of a particle [Pa]
+RECORD_FIELD_PRESSURE = 2  # highest field pressure [Pa]
+RECORD_HEAD = 3  # lanes
+
+
+@wp.func
+def highest_in_region(grid: Grid, nodes: wp.array(dtype=int), begin: int, end: int) -> scalar:
+    """Highest field pressure of the listed nodes that are at least half filled [Pa]."""
+    peak = ZERO
+    for n in range(begin, end):
+        node = nodes[n]
+        if grid.node[node][7] >= HALF:
+            peak = wp.max(peak, grid.pressure[node])
+    return peak
+
+
+@wp.func
+def interpolate(grid: Grid, node: int, f: vector3) -> scalar:
+    """Trilinear field pressure at the fraction f of the cell above a node [Pa]."""
+    pressure = ZERO
+    for i in range(2):
+        for j in range(2):
+            for k in range(2):
+                w = wp.abs(scalar(1 - i) - f[0]) * wp.abs(scalar(1 - j) - f[1]) * wp.abs(scalar(1 - k) - f[2])
+                pressure += w * grid.pressure[node + i * grid.stride_x + j * grid.stride_y + k]
+    return pressure
+
+
+@wp.kernel(enable_backward=False)
+def record_step(
+    grid: Grid,
+    clock: wp.array(dtype=Clock),
+    slabs: int,
+    maxima: wp.array(dtype=Maxima),
+    slots: int,
+    peaks: wp.array(dtype=scalar),
+    region_nodes: wp.array(dtype=int),
+    region_begin: wp.array(dtype=int),
+    line_nodes: wp.array(dtype=int),
+    line_fractions: wp.array(dtype=vector3),
+    times: wp.array(dtype=wp.float64),
+    rows: wp.array2d(dtype=scalar),
+    row_offset: int,
+):
+    """Write one row of the record; thread 0 its head, the others a region or a point of the line each."""
+    thread = wp.tid()
+    row = clock[0].step - row_offset
+    regions = region_begin.shape[0] - 1
+    if thread == 0:
+        times[row] = clock[0].time
+        particle_pressure = ZERO
+        for slab in range(slabs):
+            particle_pressure = wp.max(particle_pressure, maxima[slab][PARTICLE_PRESSURE])
+        field_pressure = ZERO
+        for slot in range(slots):
+            field_pressure = wp.max(field_pressure, peaks[slot])
+            peaks[slot] = ZERO
+        rows[row, RECORD_DT] = clock[0].dt
+        rows[row, RECORD_PARTICLE_PRESSURE] = particle_pressure
+        rows[row, RECORD_FIELD_PRESSURE] = field_pressure
+    elif thread <= regions:
+        region = thread - 1
+        rows[row, RECORD_HEAD + region] = highest_in_region(
+            grid, region_nodes, region_begin[region], region_begin[region + 1]
+        )
+    else:
+        point = thread - 1 - regions
+        rows[row, RECORD_HEAD + regions + point] = interpolate(grid, line_nodes[point], line_fractions[point])

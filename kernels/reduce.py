@@ -1,0 +1,153 @@
+"""Reductions: the next time step, the walls' impulse, the audit of mass, momentum and energy."""
+
+import warp as wp
+
+from warp_mpm.kernels.grid import active_node
+from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3
+from warp_mpm.kernels.records import (
+    BURN_SPEED,
+    DISPLACEMENT,
+    SIGNAL_SPEED,
+    SPEED_X,
+    STRAIN_RATE,
+    VISCOUS_RATE,
+    Clock,
+    Grid,
+    Maxima,
+    Particles,
+    node_index,
+)
+from warp_mpm.kernels.walls import Boundary, is_owner
+
+GROWTH = wp.constant(scalar(1.1))  # of the time step, from one step to the next, at most
+LARGEST_STRAIN = wp.constant(scalar(0.2))  # |div v| dt, at most
+DAMPING = wp.constant(scalar(0.2))  # k of the conservative damping
+TINY = wp.constant(scalar(1.0e-30))  # keeps a rate that is zero from being divided by
+
+# Lanes of the audit, one row for each slab.
+AUDIT_MASS = 0  # [kg]
+AUDIT_MOMENTUM = 1  # three lanes [kg m/s]
+AUDIT_ABSOLUTE_MOMENTUM = 4  # sum m |v| [kg m/s]
+AUDIT_KINETIC = 5  # [J]
+AUDIT_INTERNAL = 6  # [J]
+AUDIT_RELEASED = 7  # sum F m E0 [J]
+AUDIT_VOLUME = 8  # [m3]
+AUDIT_POSITION = 9  # three lanes, sum m x from the domain's lower corner [kg m]
+AUDIT = 12  # lanes
+
+
+@wp.func
+def largest(maxima: wp.array(dtype=Maxima), slabs: int, lane: int) -> scalar:
+    """Largest value of a lane over the slabs."""
+    result = ZERO
+    for slab in range(slabs):
+        result = wp.max(result, maxima[slab][lane])
+    return result
+
+
+@wp.kernel(enable_backward=False)
+def start_step(
+    clock: wp.array(dtype=Clock),
+    spacing: vector3,
+    length: scalar,
+    cfl: scalar,
+    slabs: int,
+    maxima: wp.array(dtype=Maxima),
+):
+    """Choose the time step, advance the time to its end, set the damping, and empty the maxima.
+
+    dt = cfl / max over axes of max(c + |v_axis|, D) / h_axis; cfl l^2 / nu for the viscosity; |div v| dt <= 0.2;
+    at most 1.1 times the last; clipped to the end time. alpha = k s / (1 + k s), s = dt max(c + |v|) / h.
+    """
+    now = clock[0]
+    burn_speed = largest(maxima, slabs, BURN_SPEED)
+    rate = largest(maxima, slabs, VISCOUS_RATE)
+    for axis in range(3):
+        rate = wp.max(rate, wp.max(largest(maxima, slabs, SPEED_X + axis), burn_speed) / spacing[axis])
+    dt = wp.min(cfl / wp.max(rate, TINY), LARGEST_STRAIN / wp.max(largest(maxima, slabs, STRAIN_RATE), TINY))
+    if now.step > 0:
+        dt = wp.min(dt, GROWTH * now.dt)
+    left = now.end_time - now.time
+    clipped = wp.float64(dt) >= left
+    now.time = now.time + wp.float64(dt)
+    if clipped:
+        dt = scalar(left)
+        now.time = now.end_time
+    if now.step == 0:
+        now.first_dt = dt
+        now.smallest_dt = dt
+    if not clipped:
+        now.smallest_dt = wp.min(now.smallest_dt, dt)
+    crossing = DAMPING * dt * largest(maxima, slabs, SIGNAL_SPEED) / length
+    now.damping = crossing / (ONE + crossing)
+    now.dt = dt
+    now.step = now.step + 1
+    clock[0] = now
+    for slab in range(slabs):
+        maxima[slab] = Maxima()
+
+
+@wp.kernel(enable_backward=False)
+def end_step(clock: wp.array(dtype=Clock), slabs: int, maxima: wp.array(dtype=Maxima)):
+    """Add the way of the fastest particle to the drift since the last sorting."""
+    now = clock[0]
+    now.last_drift = largest(maxima, slabs, DISPLACEMENT)
+    now.drift = now.drift + now.last_drift
+    clock[0] = now
+
+
+@wp.kernel(enable_backward=False)
+def collect_reactions(
+    clock: wp.array(dtype=Clock),
+    reactions: wp.array(dtype=wp.float64),
+    pending: wp.array(dtype=wp.float64),
+    impulses: wp.array(dtype=wp.float64),
+):
+    """Impulse of the walls in this step: their forces times dt, and what PIC took over from them."""
+    lane = wp.tid()
+    impulses[lane] = impulses[lane] + reactions[lane] * wp.float64(clock[0].dt) + pending[lane]
+    reactions[lane] = wp.float64(0.0)
+    pending[lane] = wp.float64(0.0)
+
+
+@wp.func
+def add_audit(sums: wp.array(dtype=wp.float64), lane: int, value: wp.float64):
+    """sums[lane] += value."""
+    wp.atomic_add(sums, lane, value)
+
+
+@wp.kernel(enable_backward=False)
+def audit_particles(
+    particles: Particles,
+    spacing: vector3,
+    initial_energy: scalar,
+    sums: wp.array(dtype=wp.float64),
+    slab: int,
+    begin: int,
+):
+    """Sum mass, momentum, energies and volume of the particles, in double."""
+    p = begin + wp.tid()
+    mass = wp.float64(particles.mass[p])
+    velocity = particles.velocity[p]
+    lane = slab * AUDIT
+    add_audit(sums, lane + AUDIT_MASS, mass)
+    for axis in range(3):
+        add_audit(sums, lane + AUDIT_MOMENTUM + axis, mass * wp.float64(velocity[axis]))
+    add_audit(sums, lane + AUDIT_ABSOLUTE_MOMENTUM, mass * wp.float64(wp.length(velocity)))
+    add_audit(sums, lane + AUDIT_KINETIC, mass * wp.float64(HALF * wp.dot(velocity, velocity)))
+    add_audit(sums, lane + AUDIT_INTERNAL, mass * wp.float64(particles.energy[p]))
+    if particles.burn_fraction.shape[0] > 0:
+        burnt = wp.float64(particles.burn_fraction[p])
+        add_audit(sums, lane + AUDIT_RELEASED, mass * burnt * wp.float64(initial_energy))
+    add_audit(sums, lane + AUDIT_VOLUME, mass / wp.float64(particles.density[p]))
+    for axis in range(3):
+        place = wp.float64(particles.cell[p][axis]) + wp.float64(particles.fraction[p][axis])
+        add_audit(sums, lane + AUDIT_POSITION + axis, mass * place * wp.float64(spacing[axis]))
+
+
+@wp.kernel(enable_backward=False)
+def audit_grid(grid: Grid, boundary: Boundary, sums: wp.array(dtype=wp.float64), slot: int, begin: int):
+    """Sum the mass on the grid, in double."""
+    index = active_node(grid, begin + wp.tid())
+    if is_owner(boundary, grid.cells, index):
+        wp.atomic_add(sums, slot, wp.float64(grid.node[node_index(grid, index[0], index[1], index[2])][3]))

@@ -1,0 +1,41 @@
+"""Progress of a run: a bar on a terminal, lines elsewhere."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from warp_mpm.output.progress_bar import progress_on
+
+
+def run_with(progress, steps=1000):
+    progress.message("compiling [all] kernels")
+    for step in range(steps + 1):
+        progress.update(step * 1e-4 / steps, 1e-4, step, "2.61 GPa")
+    progress.close()
+
+
+def test_lines_where_there_is_no_terminal():
+    console = Console(file=io.StringIO(), width=40)
+    run_with(progress_on(console))
+    lines = console.file.getvalue().splitlines()
+    assert lines[0] == "compiling [all] kernels"
+    assert [line.split()[0] for line in lines[1:]] == [f"{tenth}0%" if tenth else "0%" for tenth in range(11)]
+    assert "50.0 of 100.0 us  step 500  2.61 GPa  " in lines[6]
+    assert lines[6].endswith(" s left")
+
+
+def test_a_bar_on_a_terminal():
+    console = Console(file=io.StringIO(), width=100, force_terminal=True)
+    run_with(progress_on(console))
+    text = console.file.getvalue()
+    assert "compiling [all] kernels" in text
+    assert "100%" in text
+    assert "100.0 of 100.0 us  step 1000  2.61 GPa" in text
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_closing_before_the_first_update_and_twice(terminal):
+    progress = progress_on(Console(file=io.StringIO(), force_terminal=terminal))
+    progress.close()
+    progress.close()

@@ -1,0 +1,258 @@
+"""The shipped scenes are what the paper and the design say, and scene files load, fail and list as documented."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warp_mpm.errors import InputError
+from warp_mpm.scene import FACE_NAMES, Wall, Walls
+from warp_mpm.scene_loading import list_scenes, load_scene
+from warp_mpm.simulation import simulate
+
+SHIPPED = ("six_point", "taylor_wave", "two_point")
+PLATE_SCENES = ("six_point", "two_point")
+COARSE = 2e-2  # [m]
+
+
+@pytest.mark.parametrize("name", PLATE_SCENES)
+def test_plate_scenes(name):
+    scene = load_scene(name, cell_size=COARSE)
+    (plate,) = scene.charges
+    assert scene.name == name
+    assert scene.domain.lower == (0.0, 0.0, 0.0)
+    assert scene.domain.upper == (0.2, 0.4, 0.02)
+    assert scene.domain.cells == (10, 20, 1)
+    assert scene.particle_count == 10 * 20 * 8
+    assert scene.mass == pytest.approx(1.6)
+    assert plate.material.specific_energy == pytest.approx(1.3067e6, rel=1e-4)
+    assert plate.material.burn.detonation_speed == 2800.0
+    assert scene.walls == Walls.all(Wall.SLIP)
+    assert scene.burn_width == 3.0
+    assert (scene.section.axis, scene.section.coordinate) == (2, 0.01)
+    assert (scene.line.start, scene.line.end) == ((0.1, 0.0, 0.01), (0.1, 0.4, 0.01))
+    assert scene.warnings == ()
+    assert scene.parameters == {
+        "cell_size": COARSE,
+        "confinement": "rigid",
+        "energy": "cj",
+        "on_mismatch": "adjust",
+        "particles_per_axis": 2,
+        "margin": 0.15,
+        "end_time": scene.end_time,
+    }
+
+
+def test_two_point():
+    scene = load_scene("two_point", cell_size=COARSE)
+    assert [detonator.position for detonator in scene.detonators] == [(0.1, 0.0, 0.01), (0.1, 0.4, 0.01)]
+    assert [detonator.time for detonator in scene.detonators] == [0.0, 0.0]
+    assert all(detonator.booster for detonator in scene.detonators)
+    assert (scene.front_path.start, scene.front_path.end) == ((0.1, 0.0, 0.01), (0.1, 0.2, 0.01))
+    assert scene.collision_points == ((0.1, 0.2, 0.01),)
+    assert scene.end_time == 143e-6
+    assert scene.picture_times == (20e-6, 40e-6, 60e-6, 75e-6, 90e-6, 143e-6)
+
+
+def test_six_point():
+    scene = load_scene("six_point", cell_size=COARSE)
+    assert [detonator.position[1] for detonator in scene.detonators] == [0.0, 0.08, 0.16, 0.24, 0.32, 0.4]
+    np.testing.assert_allclose([d.time for d in scene.detonators], np.arange(6) * 0.5e-6, rtol=1e-12)
+    assert (scene.front_path.start, scene.front_path.end) == ((0.1, 0.0, 0.01), (0.1, 0.04, 0.01))
+    half_way = np.array([0.04, 0.12, 0.2, 0.28, 0.36])
+    np.testing.assert_allclose(np.array(scene.collision_points)[:, 1], half_way + 0.7e-3)
+    assert scene.end_time == 100e-6
+    assert scene.picture_times == (5e-6, 10e-6, 15e-6, 25e-6, 40e-6, 60e-6)
+
+
+@pytest.mark.parametrize("name", PLATE_SCENES)
+def test_the_plate_is_mirror_symmetric(name):
+    positions = load_scene(name, cell_size=7e-3).charges[0].positions.reshape(58, 114, 6, 3)
+    for axis, extent in enumerate((0.2, 0.4, 0.02)):
+        mirrored = np.flip(positions, axis).copy()
+        mirrored[..., axis] = extent - mirrored[..., axis]
+        np.testing.assert_allclose(mirrored, positions, rtol=0, atol=1e-15)
+
+
+def test_a_free_plate_has_the_same_cells_and_particles():
+    rigid = load_scene("two_point", cell_size=9e-3)
+    free = load_scene("two_point", cell_size=9e-3, confinement="free", margin=0.05)
+    assert free.walls == Walls.all(Wall.OPEN)
+    np.testing.assert_allclose(free.domain.spacing, rigid.domain.spacing, rtol=1e-12)
+    np.testing.assert_allclose(free.charges[0].positions, rigid.charges[0].positions, rtol=0, atol=1e-15)
+    spacing = np.array(rigid.domain.spacing)
+    margins = np.array([rigid.domain.lower, free.domain.upper]) - np.array([free.domain.lower, rigid.domain.upper])
+    assert np.all(np.abs(margins - 0.05) <= spacing / 2)
+    np.testing.assert_allclose(margins / spacing, np.round(margins / spacing), atol=1e-9)
+
+
+def test_the_papers_energy_can_be_asked_for():
+    with pytest.raises(InputError, match=r"^scene two_point: .*on_mismatch=keep"):
+        load_scene("two_point", cell_size=COARSE, energy=3.8e6)
+    scene = load_scene("two_point", cell_size=COARSE, energy=3.8e6, on_mismatch="keep")
+    assert scene.charges[0].material.specific_energy == 3.8e6
+    assert len(scene.warnings) == 1
+
+
+@pytest.mark.parametrize("name", PLATE_SCENES)
+def test_pictures_after_a_shortened_end_are_dropped(name):
+    scene = load_scene(name, cell_size=COARSE, end_time=20e-6)
+    assert 0 < len(scene.picture_times) < 6
+    assert max(scene.picture_times) <= scene.end_time == 20e-6
+
+
+@pytest.mark.parametrize("cell_size", [3e-3, 1.5e-3, 0.75e-3, 0.13])
+def test_taylor_wave(cell_size):
+    scene = load_scene("taylor_wave", cell_size=cell_size)
+    (column,) = scene.charges
+    edge = scene.domain.spacing[0]
+    assert scene.domain.spacing == pytest.approx((edge, edge, edge), rel=1e-12)
+    assert edge == pytest.approx(cell_size, rel=0.1)
+    assert scene.domain.cells[1:] == (1, 1)
+    assert scene.domain.upper[0] == pytest.approx(0.4)
+    assert scene.domain.lower[0] == pytest.approx(-0.3 - 4 * edge, abs=edge)  # the gas needs 300 mm
+    assert scene.particle_count == round(0.4 / edge) * 8
+    assert column.solid.bounds()[0][0] == 0.0
+    assert [name for name in FACE_NAMES if getattr(scene.walls, name) is not Wall.SLIP] == ["x_low"]
+    assert scene.walls.x_low is Wall.OPEN
+    assert scene.detonators[0].charges == ("column",)
+    assert scene.end_time * 2800.0 == pytest.approx(0.3)
+    assert (scene.front_path.start[0], scene.front_path.end[0]) == (0.0, 0.3)
+    assert (scene.line.start[0], scene.line.end[0]) == (0.0, 0.4)
+    assert len(scene.picture_times) == 6
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_particles_per_axis(name):
+    scene = load_scene(name, cell_size=COARSE, particles_per_axis=1)
+    assert scene.particle_count == load_scene(name, cell_size=COARSE).particle_count // 8
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("two_point", {"end_time": 30e-6}),
+        ("two_point", {"end_time": 30e-6, "confinement": "free", "margin": 0.05}),
+        ("six_point", {"end_time": 30e-6}),
+        ("six_point", {"end_time": 30e-6, "confinement": "free", "margin": 0.05}),
+        ("taylor_wave", {}),
+    ],
+)
+def test_every_scene_runs(name, parameters):
+    scene = load_scene(name, cell_size=1e-2, **parameters)
+    summary = simulate(scene).summary
+    assert summary["end_time_s"] == pytest.approx(scene.end_time)
+    assert summary["energy_error"] <= 1e-4
+    assert summary["mass_error"] <= 1e-6
+    assert summary["momentum_error"] <= 1e-3
+    # a free plate two cells thick stays far below p_CJ; walls and collisions reflect to a few times p_CJ
+    assert 0.25 * summary["p_cj_pa"] < summary["peak_pressure_pa"] < 4.0 * summary["p_cj_pa"]
+
+
+# ---- scene files -----------------------------------------------------------------------------------------------------
+
+SCENE_FILE = '''"""A small cube.
+
+More about it.
+"""
+from warp_mpm import Box, IdealGas, Material, SceneBuilder
+
+def scene(*, cell_size: float = 0.1, gamma: float = 1.4):
+    builder = SceneBuilder("small")
+    builder.domain((0, 0, 0), (1, 1, 1), cell_size=cell_size)
+    builder.charge(Box((0, 0, 0), (1, 1, 1)), Material("gas", 1.0, IdealGas(gamma), 1e5))
+    builder.end_time(1e-3)
+    return builder.build()
+'''
+
+
+@pytest.fixture
+def directory(tmp_path, monkeypatch):
+    """An empty current directory with a folder for scenes."""
+    (tmp_path / "scenes").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "scenes"
+
+
+def test_a_scene_file_by_path_and_by_name(directory):
+    (directory / "small.py").write_text(SCENE_FILE)
+    scene = load_scene(directory / "small.py", cell_size=1)
+    assert scene.particle_count == 8
+    assert scene.parameters == {"cell_size": 1.0, "gamma": 1.4}
+    assert scene.description == "A small cube."
+    assert load_scene("small").particle_count == 8000
+    assert load_scene(os.path.join("scenes", "small.py")).name == "small"
+
+
+def test_own_scenes_hide_shipped_ones_of_the_same_name(directory):
+    (directory / "two_point.py").write_text(SCENE_FILE)
+    assert load_scene("two_point").name == "small"
+    assert {file.name: file.summary for file in list_scenes()}["two_point"] == "A small cube."
+
+
+def test_listing(directory):
+    (directory / "small.py").write_text(SCENE_FILE)
+    (directory / "_private.py").write_text(SCENE_FILE)
+    (directory / "broken.py").write_text("def scene(")
+    assert [file.name for file in list_scenes()] == sorted([*SHIPPED, "small", "broken"])
+    assert [(file.name, file.summary) for file in list_scenes(directory)] == [
+        ("broken", ""),
+        ("small", "A small cube."),
+    ]
+    with pytest.raises(InputError, match="list: expected a directory of scene files, got 'nowhere'"):
+        list_scenes("nowhere")
+
+
+def test_every_shipped_scene_says_what_it_is():
+    summaries = {file.name: file.summary for file in list_scenes()}
+    assert all(summaries[name] for name in SHIPPED)
+
+
+def test_the_module_of_a_shipped_scene_is_importable():
+    from warp_mpm.scenes import two_point
+
+    assert two_point.scene(cell_size=COARSE).name == "two_point"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SCENE_FILE.replace("gamma: float = 1.4", "gamma: float = 0.9"), "scene bad: .*gamma.*0.9"),
+        (
+            SCENE_FILE.replace("cell_size=cell_size", "cell_size=-1"),
+            "scene bad: .*cell_size: expected a positive number",
+        ),
+        (SCENE_FILE.replace("1e-3", "1e-3 / 0"), r"scene bad: .*bad\.py:11: ZeroDivisionError"),
+        (SCENE_FILE.replace("return builder.build()", ""), "scene bad: expected a Scene from scene.., got None"),
+        (SCENE_FILE.replace("def scene", "def other"), "scene bad: expected a function 'scene'"),
+        (SCENE_FILE.replace("def scene(", "def scene(("), r"scene bad: .*bad\.py:7: SyntaxError"),
+        (SCENE_FILE.replace("gamma: float = 1.4", "gamma: float"), "scene bad: gamma: expected a value, got none"),
+        (SCENE_FILE.replace("gamma: float", "gamma"), "scene bad: gamma: expected an annotation"),
+        ("import nonexistent_module", r"scene bad: .*bad\.py:1: ModuleNotFoundError"),
+        ("raise ValueError('two\\nlines')", "scene bad: two lines"),
+    ],
+)
+def test_broken_scene_files_are_one_clear_line(directory, text, message):
+    (directory / "bad.py").write_text(text)
+    with pytest.raises(InputError, match=message) as caught:
+        load_scene("bad")
+    assert "\n" not in str(caught.value)
+
+
+def test_what_a_scene_raised_is_kept_for_debugging(directory):
+    (directory / "bad.py").write_text("{}['key']")
+    with pytest.raises(InputError) as caught:
+        load_scene("bad")
+    assert isinstance(caught.value.__cause__, KeyError)
+
+
+def test_unknown_scenes_and_parameters():
+    with pytest.raises(InputError, match=r"or one of .*two_point.*, got 'two_pint'; did you mean two_point"):
+        load_scene("two_pint")
+    with pytest.raises(InputError, match=r"got 'nowhere/two_point\.py'; did you mean two_point"):
+        load_scene(Path("nowhere/two_point.py"))
+    with pytest.raises(InputError, match=r"expected one of .*, got 'cellsize'; did you mean cell_size"):
+        load_scene("two_point", cellsize=1)
+    with pytest.raises(InputError, match="scene two_point: cell_size: expected a finite number, got '1'"):
+        load_scene("two_point", cell_size="1")

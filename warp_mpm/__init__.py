@@ -1,0 +1,77 @@
+"""3D simulation of detonation with the Material Point Method, on NVIDIA Warp.
+
+    import warp_mpm as mpm
+    scene = mpm.load_scene("two_point", cell_size=6e-3)
+    result = mpm.simulate(scene, output="out/two_point")
+
+Names are imported when they are first used, so that `warp-mpm --help` does not wait for Warp.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from warp_mpm import version
+
+if TYPE_CHECKING:
+    from warp_mpm.builder import SceneBuilder
+    from warp_mpm.config import Order, Save, ShapeFunction, SolverConfig, Transfer
+    from warp_mpm.detonators import PlaneDetonator, PointDetonator
+    from warp_mpm.errors import InputError, SimulationError
+    from warp_mpm.geometry import Box, Cylinder, Sphere
+    from warp_mpm.kernels.eos.ideal_gas import IdealGas
+    from warp_mpm.materials import Material, OnMismatch, ammonium_nitrate, explosive
+    from warp_mpm.scene import Scene, Wall, Walls
+    from warp_mpm.scene_loading import list_scenes, load_scene
+    from warp_mpm.simulation import Result, simulate
+
+__version__ = version.VERSION
+
+__all__ = [
+    "Box",
+    "Cylinder",
+    "IdealGas",
+    "InputError",
+    "Material",
+    "OnMismatch",
+    "Order",
+    "PlaneDetonator",
+    "PointDetonator",
+    "Result",
+    "Save",
+    "Scene",
+    "SceneBuilder",
+    "ShapeFunction",
+    "SimulationError",
+    "SolverConfig",
+    "Sphere",
+    "Transfer",
+    "Wall",
+    "Walls",
+    "__version__",
+    "ammonium_nitrate",
+    "explosive",
+    "list_scenes",
+    "load_scene",
+    "simulate",
+]
+
+_HOMES = {
+    "builder": ("SceneBuilder",),
+    "config": ("Order", "Save", "ShapeFunction", "SolverConfig", "Transfer"),
+    "detonators": ("PlaneDetonator", "PointDetonator"),
+    "errors": ("InputError", "SimulationError"),
+    "geometry": ("Box", "Cylinder", "Sphere"),
+    "kernels.eos.ideal_gas": ("IdealGas",),
+    "materials": ("Material", "OnMismatch", "ammonium_nitrate", "explosive"),
+    "scene": ("Scene", "Wall", "Walls"),
+    "scene_loading": ("list_scenes", "load_scene"),
+    "simulation": ("Result", "simulate"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from the module it lives in."""
+    for module, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,307 @@
+"""`SceneBuilder`: collects what a scene consists of, checks it, and cuts the charges into particles."""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from warp_mpm import checks
+from warp_mpm.cells import check_aspect, domain_of_cells
+from warp_mpm.charges import Body, charge_warnings, check_fit, cut_charges
+from warp_mpm.checks import mistake
+from warp_mpm.detonators import Detonator, PlaneDetonator
+from warp_mpm.geometry import Solid
+from warp_mpm.ignition import resolve_detonators
+from warp_mpm.lattice import Lattice
+from warp_mpm.materials import Material
+from warp_mpm.scene import Domain, Scene, SectionPlane, Segment, Vector, Walls
+
+OUTSIDE_TOLERANCE = 1e-9  # of the domain's size
+
+Given = TypeVar("Given")
+
+
+class SceneBuilder:
+    """Builds a scene step by step; `build` checks it and returns it.
+
+    Each method checks its own values at once, `build` how they fit together. All units are SI. Errors are
+    `InputError`s: one line that names the scene, the argument, what was expected, what came, and the remedy.
+    """
+
+    def __init__(self, name: str, description: str = "") -> None:
+        """Start a scene.
+
+        Args:
+            name: also names the output files.
+            description: one line for people.
+
+        Raises:
+            InputError: the name does not suit a file name.
+        """
+        if not re.fullmatch(r"\w[\w.-]*", name):
+            raise mistake("scene: name", "letters, digits, '_', '-' and '.'", repr(name))
+        self.name = name
+        self.description = description
+        self._here = f"scene {name}"
+        self._domain: Domain | None = None
+        self._cell_size = np.zeros(3)  # as asked for, before it was fitted to the domain
+        self._walls = Walls()
+        self._bodies: list[Body] = []
+        self._detonators: list[Detonator] = []
+        self._gravity: Vector = (0.0, 0.0, 0.0)
+        self._ambient_pressure = 0.0
+        self._end_time: float | None = None
+        self._burn_width: float | None = None
+        self._front_path: Segment | None = None
+        self._line: Segment | None = None
+        self._collision_points: list[Vector] = []
+        self._picture_times: tuple[float, ...] = ()
+        self._section: SectionPlane | None = None
+
+    # ---- where the material may be ---------------------------------------------------------------------------------
+
+    def domain(
+        self,
+        lower: Sequence[float],
+        upper: Sequence[float],
+        *,
+        cell_size: float | Sequence[float] | None = None,
+        cells: Sequence[int] | None = None,
+        margins: float | Sequence[float] = 0.0,
+    ) -> None:
+        """Set the box in which material may be, cut into equal cells.
+
+        Args:
+            lower: corner of the smallest coordinates [m].
+            upper: corner of the largest [m].
+            cell_size: wanted cell size, one for all axes or one each [m]; as many cells as fit best fill the box.
+            cells: the number of cells per axis instead.
+            margins: room beyond the box, one for all faces or one each in the order of `FACE_NAMES` [m], rounded to
+                whole cells: the cells inside the box are the same with and without.
+
+        Raises:
+            InputError: a number is not finite or not positive, there are too many cells, or not exactly one of
+                `cell_size` and `cells` is given.
+        """
+        here = f"{self._here}: domain"
+        low, high = checks.vector(f"{here}: lower", lower), checks.vector(f"{here}: upper", upper)
+        extent = np.subtract(high, low)
+        if np.any(extent <= 0.0):
+            raise mistake(f"{here}: upper", f"above lower {low} on every axis", high)
+        if (cell_size is None) == (cells is None):
+            raise mistake(here, "either cell_size or cells", "neither" if cells is None else "both")
+        if cells is None:
+            self._cell_size = np.array(checks.each(f"{here}: cell_size", cell_size, 3, checks.positive))
+            counts = np.maximum(np.round(extent / self._cell_size), 1.0)
+        else:
+            counts = np.array(checks.each(f"{here}: cells", cells, 3, checks.count))
+            self._cell_size = extent / counts
+        rooms = checks.each(f"{here}: margins", margins, 6, checks.not_negative)
+        self._domain = domain_of_cells(here, low, high, counts, rooms)
+
+    def walls(self, walls: Walls) -> None:
+        """Set what the faces of the domain do; without this they are all slip walls.
+
+        Raises:
+            InputError: not a `Walls`.
+        """
+        self._walls = checks.instance(f"{self._here}: walls", walls, Walls, "a Walls")
+
+    # ---- what it is, and what starts it ----------------------------------------------------------------------------
+
+    def charge(self, solid: Solid, material: Material, *, particles_per_axis: int = 2, name: str | None = None) -> None:
+        """Add a body of one material.
+
+        Args:
+            solid: its shape.
+            material: what it is made of.
+            particles_per_axis: particles along each axis of every cell.
+            name: for detonators and messages; without one "charge_1", "charge_2", ...
+
+        Raises:
+            InputError: an argument is of the wrong kind, or the name is taken.
+        """
+        name = f"charge_{len(self._bodies) + 1}" if name is None else name
+        here = f"{self._here}: charge {name!r}"
+        if any(body.name == name for body in self._bodies):
+            raise mistake(here, "a name of its own", "one that another charge has")
+        checks.instance(f"{here}: solid", solid, Solid, "a Solid, such as Box, Sphere or Cylinder")
+        checks.instance(f"{here}: material", material, Material, "a Material")
+        per_axis = checks.count(f"{here}: particles_per_axis", particles_per_axis)
+        self._bodies.append(Body(name, solid, material, per_axis))
+
+    def detonator(self, detonator: Detonator) -> None:
+        """Add a detonator. One that names no charges lights the charge it lies in.
+
+        Raises:
+            InputError: not a detonator, a number is not finite, the time is negative, or a normal has no length.
+        """
+        here = f"{self._here}: detonator {len(self._detonators) + 1}"
+        checks.instance(here, detonator, Detonator, "a PointDetonator or a PlaneDetonator")
+        position = checks.vector(f"{here}: position", detonator.position)
+        time = checks.not_negative(f"{here}: time", detonator.time)
+        if isinstance(detonator, PlaneDetonator) and not any(checks.vector(f"{here}: normal", detonator.normal)):
+            raise mistake(f"{here}: normal", "a vector of any length but 0", detonator.normal)
+        self._detonators.append(replace(detonator, position=position, time=time))
+
+    def gravity(self, acceleration: Sequence[float]) -> None:
+        """Set a constant body force [m/s2]; without this there is none.
+
+        Raises:
+            InputError: not three finite numbers.
+        """
+        self._gravity = checks.vector(f"{self._here}: gravity", acceleration)
+
+    def ambient_pressure(self, pressure: float) -> None:
+        """Set the pressure outside the open faces [Pa]; without this it is 0.
+
+        Raises:
+            InputError: not a finite number of at least 0.
+        """
+        self._ambient_pressure = checks.not_negative(f"{self._here}: ambient_pressure", pressure)
+
+    def end_time(self, time: float) -> None:
+        """Set when the simulation ends [s].
+
+        Raises:
+            InputError: not a positive finite number.
+        """
+        self._end_time = checks.positive(f"{self._here}: end_time", time)
+
+    def burn_width(self, cells: float) -> None:
+        """Recommend a width of the burn zone to the solver [cells].
+
+        Raises:
+            InputError: not a positive finite number.
+        """
+        self._burn_width = checks.positive(f"{self._here}: burn_width", cells)
+
+    # ---- what to look at -------------------------------------------------------------------------------------------
+
+    def front_path(self, start: Sequence[float], end: Sequence[float]) -> None:
+        """Set the line [m], from a detonator on, along which front pressure and front speed are measured.
+
+        Raises:
+            InputError: not two different points.
+        """
+        self._front_path = self._segment("front_path", start, end)
+
+    def line(self, start: Sequence[float], end: Sequence[float]) -> None:
+        """Set the line [m] along which the pressure is recorded at every step; without this it is the front path.
+
+        Raises:
+            InputError: not two different points.
+        """
+        self._line = self._segment("line", start, end)
+
+    def collision_point(self, point: Sequence[float]) -> None:
+        """Add a point [m] where fronts are expected to meet.
+
+        Raises:
+            InputError: not three finite numbers.
+        """
+        here = f"{self._here}: collision_point {len(self._collision_points) + 1}"
+        self._collision_points.append(checks.vector(here, point))
+
+    def picture_times(self, times: Iterable[float]) -> None:
+        """Set the instants worth a picture [s].
+
+        Raises:
+            InputError: one is not a finite number of at least 0.
+        """
+        self._picture_times = tuple(checks.not_negative(f"{self._here}: picture_times", time) for time in times)
+
+    def section(self, axis: int, coordinate: float) -> None:
+        """Set the plane, normal to `axis` (0, 1, 2) at `coordinate` [m], on which the field pressure is shown.
+
+        Without this it cuts the charges half-way across the axis along which they are thinnest.
+
+        Raises:
+            InputError: not an axis, or not a finite number.
+        """
+        here = f"{self._here}: section"
+        if axis not in (0, 1, 2):
+            raise mistake(f"{here}: axis", "0, 1 or 2", repr(axis))
+        self._section = SectionPlane(int(axis), checks.finite(f"{here}: coordinate", coordinate))
+
+    # ---- the scene -------------------------------------------------------------------------------------------------
+
+    def build(self) -> Scene:
+        """Check how everything fits together, cut the charges into particles, and return the scene.
+
+        Raises:
+            InputError: something is missing, does not fit, or needs more memory than there is.
+        """
+        domain = self._given("domain", self._domain)
+        end_time = self._given("end_time", self._end_time)
+        if not self._bodies:
+            raise mistake(f"{self._here}: charges", "at least one", "none", "add one with charge()")
+        check_fit(self._here, self._bodies, domain, self._cell_size)
+        check_aspect(self._here, domain)
+        section = self._section if self._section is not None else _mid_plane([body.solid for body in self._bodies])
+        self._check_views(domain, end_time, section)
+        reach = max(domain.spacing) / 2
+        detonators = resolve_detonators(self._here, self._detonators, self._bodies, reach)
+        charges = cut_charges(self._here, self._bodies, domain)
+        return Scene(
+            name=self.name,
+            domain=domain,
+            walls=self._walls,
+            charges=charges,
+            detonators=detonators,
+            end_time=end_time,
+            section=section,
+            description=self.description,
+            gravity=self._gravity,
+            ambient_pressure=self._ambient_pressure,
+            burn_width=self._burn_width,
+            front_path=self._front_path,
+            line=self._line if self._line is not None else self._front_path,
+            collision_points=tuple(self._collision_points),
+            picture_times=self._picture_times,
+            warnings=tuple(
+                warning
+                for body, charge in zip(self._bodies, charges, strict=True)
+                for warning in charge_warnings(charge, Lattice(domain, body.particles_per_axis).site_volume)
+            ),
+        )
+
+    def _given(self, name: str, value: Given | None) -> Given:
+        if value is None:
+            raise mistake(f"{self._here}: {name}", "a value", "none", f"set it with {name}()")
+        return value
+
+    def _segment(self, name: str, start: Sequence[float], end: Sequence[float]) -> Segment:
+        here = f"{self._here}: {name}"
+        segment = Segment(checks.vector(f"{here}: start", start), checks.vector(f"{here}: end", end))
+        if segment.start == segment.end:
+            raise mistake(f"{here}: end", "another point than start", segment.end)
+        return segment
+
+    def _check_views(self, domain: Domain, end_time: float, section: SectionPlane) -> None:
+        """Check that what is looked at lies in the domain and before the end."""
+        points = {f"collision_point {n}": point for n, point in enumerate(self._collision_points, start=1)}
+        for name, segment in (("front_path", self._front_path), ("line", self._line)):
+            if segment is not None:
+                points |= {f"{name}: start": segment.start, f"{name}: end": segment.end}
+        x, y, z = (section.coordinate if axis == section.axis else domain.lower[axis] for axis in range(3))
+        points["section"] = (x, y, z)
+        tolerance = OUTSIDE_TOLERANCE * np.subtract(domain.upper, domain.lower)
+        for name, point in points.items():
+            if np.any(point < domain.lower - tolerance) or np.any(point > domain.upper + tolerance):
+                expected = f"inside the domain, from {domain.lower} to {domain.upper} m"
+                raise mistake(f"{self._here}: {name}", expected, point)
+        for time in self._picture_times:
+            if time > end_time:
+                raise mistake(f"{self._here}: picture_times", f"at most the end time, {end_time:g} s", f"{time:g} s")
+
+
+def _mid_plane(solids: Sequence[Solid]) -> SectionPlane:
+    """The plane half-way across the thinnest axis of the solids; of equally thin axes the last."""
+    bounds = np.array([solid.bounds() for solid in solids])
+    lower, upper = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+    extent = upper - lower
+    axis = max(axis for axis in range(3) if extent[axis] <= extent.min() * (1.0 + OUTSIDE_TOLERANCE))
+    return SectionPlane(axis, float(lower[axis] + upper[axis]) / 2)

@@ -1,0 +1,103 @@
+"""Checks of single values that a user gives; each error is one line: where, expected, got."""
+
+import math
+from collections.abc import Callable, Iterable
+from numbers import Integral, Real
+from typing import Any, TypeVar
+
+from warp_mpm.errors import InputError
+
+Vector = tuple[float, float, float]
+Number = TypeVar("Number", int, float)
+
+
+def mistake(where: str, expected: str, got: object, remedy: str = "") -> InputError:
+    """The error to raise when a value is wrong: one line that says where, expected, got, and the remedy if any."""
+    return InputError(f"{where}: expected {expected}, got {got}" + (f"; {remedy}" if remedy else ""))
+
+
+def finite(where: str, value: Any, expected: str = "a finite number") -> float:
+    """`value` as a float.
+
+    Raises:
+        InputError: it is not a finite real number.
+    """
+    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
+        raise mistake(where, expected, repr(value))
+    return float(value)
+
+
+def positive(where: str, value: Any) -> float:
+    """`value` as a float above zero.
+
+    Raises:
+        InputError: it is not a finite number above zero.
+    """
+    expected = "a positive number"
+    number = finite(where, value, expected)
+    if number <= 0.0:
+        raise mistake(where, expected, repr(value))
+    return number
+
+
+def not_negative(where: str, value: Any) -> float:
+    """`value` as a float of at least zero.
+
+    Raises:
+        InputError: it is not a finite number of at least zero.
+    """
+    expected = "a number of at least 0"
+    number = finite(where, value, expected)
+    if number < 0.0:
+        raise mistake(where, expected, repr(value))
+    return number
+
+
+def count(where: str, value: Any) -> int:
+    """`value` as an int of at least one.
+
+    Raises:
+        InputError: it is not a whole number of at least one.
+    """
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
+        raise mistake(where, "a whole number of at least 1", repr(value))
+    return int(value)
+
+
+def vector(where: str, value: Any) -> Vector:
+    """`value` as three floats.
+
+    Raises:
+        InputError: it is not three finite numbers.
+    """
+    expected = "three finite numbers"
+    parts = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
+    if len(parts) != 3:
+        raise mistake(where, expected, repr(value))
+    x, y, z = (finite(where, part, expected) for part in parts)
+    return (x, y, z)
+
+
+def each(where: str, value: Any, length: int, check: Callable[[str, Any], Number]) -> list[Number]:
+    """`value` as a list of `length` numbers, each passed through `check`; a single number stands for all of them.
+
+    Raises:
+        InputError: there are more or fewer numbers, or one does not pass.
+    """
+    if not isinstance(value, Iterable) or isinstance(value, str):
+        return [check(where, value)] * length
+    parts = list(value)
+    if len(parts) != length:
+        raise mistake(where, f"one number or {length}", repr(value))
+    return [check(where, part) for part in parts]
+
+
+def instance(where: str, value: Any, kind: Any, expected: str) -> Any:
+    """`value` itself.
+
+    Raises:
+        InputError: it is not an instance of `kind`, which the message calls `expected`.
+    """
+    if not isinstance(value, kind):
+        raise mistake(where, expected, repr(value))
+    return value

@@ -1,0 +1,161 @@
+"""The command line `warp-mpm`.
+
+A user's mistake is one line on standard error and exit code 2; a run that cannot go on, code 1; an interrupt, 130.
+Modules that take long to import are imported where they are used: `list` and `--help` answer at once.
+"""
+
+import argparse
+import sys
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from warp_mpm.checks import count, mistake
+from warp_mpm.config import Save, SolverConfig
+from warp_mpm.errors import InputError, SimulationError
+from warp_mpm.parameters import annotations_of, from_text
+from warp_mpm.version import VERSION
+
+SUCCESS, FAILURE, MISTAKE, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Args:
+        arguments: words after `warp-mpm`; those of this process if not given.
+    """
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        options = _parser().parse_args(words)
+        options.command(options)
+    except InputError as error:
+        return _report(str(error), MISTAKE, words)
+    except (SimulationError, OSError) as error:
+        return _report(str(error), FAILURE, words)
+    except KeyboardInterrupt:
+        return _report("interrupted; the frames written so far are kept", INTERRUPTED, words)
+    except Exception as error:
+        remedy = "this is a fault of warp_mpm: please report it with what --debug shows"
+        return _report(f"{type(error).__name__}: {error}; {remedy}", FAILURE, words)
+    return SUCCESS
+
+
+def _report(text: str, exit_code: int, words: Sequence[str]) -> int:
+    """Say in one line what went wrong, after the traceback of the current exception if `--debug` asks for it."""
+    if "--debug" in words:
+        traceback.print_exc()
+    print(f"warp-mpm: {' '.join(text.split())}", file=sys.stderr)
+    return exit_code
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports wrong usage as every other mistake: in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise what argparse found.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError(f"{message}; see {self.prog} --help")
+
+
+def _parser() -> argparse.ArgumentParser:
+    """All commands and their options."""
+    common = _Parser(add_help=False)
+    common.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    parser = _Parser(prog="warp-mpm", description="3D simulation of detonation with the Material Point Method.")
+    parser.add_argument("--version", action="version", version=f"%(prog)s {VERSION}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    run = commands.add_parser("run", parents=[common], help="simulate a scene", description="Simulate a scene.")
+    run.set_defaults(command=_run)
+    run.add_argument("scene", metavar="SCENE", help="a scene file, or a name that 'warp-mpm list' shows")
+    run.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: out/<scene>)")
+    _add_settings(run, "--set", "parameters of the scene, e.g. cell_size=6e-3 confinement=free")
+    _add_settings(run, "--solver", "settings of the solver, e.g. shape=linear viscosity=1.5,0.06")
+    run.add_argument("--frames", type=int, default=Save().frames, help="saved frames (default: %(default)s)")
+    run.add_argument("--device", help="cpu, cuda:0, ... (default: the GPU if there is one)")
+    run.add_argument("--threads", type=int, help="threads on a CPU (default: one per core)")
+
+    scenes = commands.add_parser("list", parents=[common], help="list scenes", description="List scenes.")
+    scenes.set_defaults(command=_list)
+    scenes.add_argument("directory", metavar="DIR", nargs="?", help="default: ./scenes and the shipped scenes")
+
+    info = commands.add_parser("info", parents=[common], help="describe a result", description="Describe a result.")
+    info.set_defaults(command=_info)
+    info.add_argument("path", metavar="PATH", type=Path, help="a run directory or a USD file")
+    return parser
+
+
+def _add_settings(parser: argparse.ArgumentParser, option: str, purpose: str) -> None:
+    """An option that takes any number of "name=value", and may come more than once."""
+    parser.add_argument(option, metavar="name=value", nargs="+", action="extend", default=[], help=purpose)
+
+
+def _run(options: argparse.Namespace) -> None:
+    """Simulate a scene and print how the figures compare with theory.
+
+    Raises:
+        InputError: scene, parameters, settings, device or output directory do not work.
+        SimulationError: the run cannot go on.
+    """
+    from rich.console import Console
+
+    from warp_mpm.output.progress_bar import progress_on
+    from warp_mpm.output.tables import print_summary
+    from warp_mpm.scene_loading import load_scene_from_text
+    from warp_mpm.simulation import simulate
+    from warp_mpm.warp_startup import start_quietly
+
+    if options.threads is not None:
+        count("threads", options.threads)
+    config = SolverConfig(**from_text(options.solver, annotations_of(SolverConfig, "solver"), "solver"))
+    save = Save(frames=options.frames)
+    start_quietly()
+    scene = load_scene_from_text(options.scene, options.set)
+    progress = progress_on(Console())
+    try:
+        result = simulate(
+            scene,
+            config=config,
+            save=save,
+            output=options.output if options.output is not None else Path("out") / scene.name,
+            device=options.device,
+            threads=options.threads,
+            progress=progress,
+        )
+    finally:
+        progress.close()
+    print_summary(result.summary)
+    print(f"files in {result.output}")
+
+
+def _list(options: argparse.Namespace) -> None:
+    """Print the names of scenes and what they are.
+
+    Raises:
+        InputError: the directory does not exist.
+    """
+    from warp_mpm.scene_loading import list_scenes
+
+    scenes = list_scenes(options.directory)
+    width = max((len(scene.name) for scene in scenes), default=0)
+    for scene in scenes:
+        print(f"{scene.name:{width}}  {scene.summary}")
+
+
+def _info(options: argparse.Namespace) -> None:
+    """Print what a run directory or a USD file holds.
+
+    Raises:
+        InputError: there is no such file, or it is none of these.
+    """
+    if not options.path.exists():
+        raise mistake("info", "a run directory or a USD file", repr(str(options.path)))
+
+    from warp_mpm.output.info import describe
+
+    print(describe(options.path))

@@ -1,0 +1,103 @@
+"""How a scene is solved (`SolverConfig`) and when results are saved (`Save`): immutable, separate from the scene."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from warp_mpm.errors import InputError
+
+
+class ShapeFunction(Enum):
+    """How a particle's extent is spread over the nodes."""
+
+    LINEAR = "linear"
+    GIMP = "gimp"
+    BSPLINE = "bspline"
+
+
+class Order(Enum):
+    """When the strain is taken in the step (Bardenhagen 2002; Nairn 2003).
+
+    MUSL: from the velocity re-projected after the particles moved on. USL: from the velocity at the end of the step.
+    USF: from the velocity at its start, before the forces.
+    """
+
+    MUSL = "musl"
+    USL = "usl"
+    USF = "usf"
+
+
+class Transfer(Enum):
+    """How velocity goes from the grid back to the particles.
+
+    DAMPED_FLIP removes, conservatively, the velocity that the grid cannot see; it needs the re-projection of MUSL.
+    """
+
+    DAMPED_FLIP = "damped_flip"
+    FLIP = "flip"
+    APIC = "apic"
+
+
+@dataclass(frozen=True)
+class SolverConfig:
+    """How a scene is solved. One set of defaults for all problems."""
+
+    shape: ShapeFunction = ShapeFunction.BSPLINE
+    order: Order = Order.MUSL
+    transfer: Transfer = Transfer.DAMPED_FLIP
+    pic_share: float = 0.0  # 0: pure FLIP, 1: pure PIC; with transfer=flip only
+    burn_width: float | None = None  # width of the burn zone [cells]; None: the scene's, else 3
+    viscosity: tuple[float, float] = (1.5, 0.06)  # quadratic and linear coefficient of the artificial viscosity
+    cfl: float = 0.3  # Courant number of the time step
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            InputError: a value is out of range, or two of them exclude each other.
+        """
+        _check("pic_share", 0.0 <= self.pic_share <= 1.0, "a share between 0 and 1", self.pic_share)
+        if self.burn_width is not None:
+            _check("burn_width", 0.0 < self.burn_width < math.inf, "a positive number of cells", self.burn_width)
+        _check("cfl", 0.0 < self.cfl <= 1.0, "a Courant number above 0, at most 1", self.cfl)
+        viscosity_ok = len(self.viscosity) == 2 and all(0.0 <= c < math.inf for c in self.viscosity)
+        _check("viscosity", viscosity_ok, "two non-negative coefficients, quadratic and linear", self.viscosity)
+        if self.transfer is Transfer.DAMPED_FLIP and self.order is not Order.MUSL:
+            raise InputError(
+                f"solver: order: expected musl with transfer=damped_flip, got {self.order.value}; "
+                "the damping uses the re-projected velocity, so choose transfer=flip or transfer=apic"
+            )
+        if self.pic_share > 0.0 and self.transfer is not Transfer.FLIP:
+            raise InputError(
+                f"solver: pic_share: expected 0 with transfer={self.transfer.value}, got {self.pic_share:g}; "
+                "a PIC share mixes with plain FLIP, so choose transfer=flip"
+            )
+
+
+@dataclass(frozen=True)
+class Save:
+    """When and what to save."""
+
+    frames: int = 60  # including the first and the last
+    fields: tuple[str, ...] = ()  # further particle fields in the USD file, from `PARTICLE_FIELDS`
+    figures: bool = True  # draw the pictures at the end
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            InputError: fewer than two frames, or an unknown field.
+        """
+        if self.frames < 2:
+            raise InputError(f"save: frames: expected at least 2, the first and the last, got {self.frames}")
+        for name in self.fields:
+            if name not in PARTICLE_FIELDS:
+                raise InputError(f"save: fields: expected any of {', '.join(PARTICLE_FIELDS)}, got {name!r}")
+
+
+PARTICLE_FIELDS = ("density", "burn_fraction", "arrival_time", "particleVelocity")
+
+
+def _check(name: str, valid: bool, expected: str, got: object) -> None:
+    if not valid:
+        raise InputError(f"solver: {name}: expected {expected}, got {got}")

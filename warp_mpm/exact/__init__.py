@@ -1,0 +1,1 @@
+"""Exact solutions, each headed by its problem statement, equations and reference."""

@@ -1,0 +1,101 @@
+"""The Chapman-Jouguet state of an explosive, from its equation of state alone.
+
+Problem: a plane detonation wave runs at the speed D into matter at rest of density rho0 and zero pressure, whose
+specific internal energy E0 contains the chemical energy. Which is the slowest steady wave?
+
+Equations (v = 1 / rho): the Hugoniot e - E0 = p (v0 - v) / 2 with p = a(rho) + b(rho) e gives
+p_H(v) = (a + b E0) / (1 - b (v0 - v) / 2); the Rayleigh line D^2 = v0^2 p / (v0 - v). The slowest wave touches the
+Hugoniot, where it is sonic: rho^2 c^2 (v0 - v) = p_H. Particle velocity u = D (v0 - v) / v0.
+
+For an ideal gas: rho = rho0 (gamma + 1) / gamma, p = rho0 D^2 / (gamma + 1), D^2 = 2 (gamma^2 - 1) E0.
+
+Reference: W. Fickett, W. C. Davis, Detonation: Theory and Experiment, Dover 2000, section 2A.
+"""
+
+import math
+from dataclasses import dataclass
+
+from warp_mpm.kernels.eos import EquationOfState
+
+HIGHEST_COMPRESSION = 20.0  # rho / rho0 up to which the state is searched
+SEARCH_STEP = 1.01  # growth of rho in the search
+BISECTIONS = 40
+
+
+@dataclass(frozen=True)
+class ChapmanJouguetState:
+    """State at the end of the reaction of a self-sustained detonation."""
+
+    detonation_speed: float  # D [m/s]
+    pressure: float  # p_CJ [Pa]
+    density: float  # [kg/m3]
+    particle_velocity: float  # u [m/s]
+    sound_speed: float  # c [m/s] = D - u
+
+
+def hugoniot_pressure(eos: EquationOfState, initial_density: float, energy: float, density: float) -> float:
+    """Pressure p_H [Pa] of products at `density` behind a wave into matter of specific energy `energy` [J/kg].
+
+    Infinite beyond the strongest compression that the Hugoniot allows.
+    """
+    record = eos.record()
+    offset = float(eos.pressure_offset(record, density))
+    slope = float(eos.pressure_slope(record, density))
+    room = 1.0 - 0.5 * slope * (1.0 / initial_density - 1.0 / density)
+    return (offset + slope * energy) / room if room > 0.0 else math.inf
+
+
+def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: float) -> ChapmanJouguetState:
+    """The Chapman-Jouguet state for an initial density [kg/m3] and specific energy E0 [J/kg].
+
+    Raises:
+        ValueError: the equation of state has no such state up to a compression of 20.
+    """
+    record = eos.record()
+    initial_volume = 1.0 / initial_density
+
+    def excess(density: float) -> float:
+        """Sonic condition rho^2 c^2 (v0 - v) - p_H: negative on weak waves, positive on overcompressed ones."""
+        pressure = hugoniot_pressure(eos, initial_density, energy, density)
+        if math.isinf(pressure):
+            return math.inf
+        compression = initial_volume - 1.0 / density
+        internal = energy + 0.5 * pressure * compression
+        return density**2 * float(eos.sound_speed_squared(record, density, internal)) * compression - pressure
+
+    low = initial_density * SEARCH_STEP
+    high = low
+    while excess(high) < 0.0:
+        low, high = high, high * SEARCH_STEP
+        if high > HIGHEST_COMPRESSION * initial_density:
+            raise ValueError(
+                f"{eos}: expected a Chapman-Jouguet state below {HIGHEST_COMPRESSION:g} times the initial density "
+                f"{initial_density:g} kg/m3 with the energy {energy:g} J/kg, found none; check the parameters' units"
+            )
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) < 0.0 else (low, middle)
+    density = 0.5 * (low + high)
+    pressure = hugoniot_pressure(eos, initial_density, energy, density)
+    compression = initial_volume - 1.0 / density
+    speed = initial_volume * math.sqrt(pressure / compression)
+    particle_velocity = speed * compression / initial_volume
+    return ChapmanJouguetState(speed, pressure, density, particle_velocity, speed - particle_velocity)
+
+
+def energy_for_speed(eos: EquationOfState, initial_density: float, detonation_speed: float) -> float:
+    """Specific energy E0 [J/kg] with which the equation of state detonates at a given speed [m/s].
+
+    D^2 is proportional to E0 for an ideal gas and nearly so for others, which makes the iteration a quick one.
+
+    Raises:
+        ValueError: there is no such energy.
+    """
+    energy = 0.25 * detonation_speed**2
+    for _ in range(50):
+        implied = chapman_jouguet_state(eos, initial_density, energy).detonation_speed
+        ratio = (detonation_speed / implied) ** 2
+        energy *= ratio
+        if abs(ratio - 1.0) < 5e-7:
+            return energy
+    raise ValueError(f"{eos}: expected an energy that gives {detonation_speed:g} m/s, found none")

@@ -1,0 +1,148 @@
+"""Materials: equation of state, density, energy, and for explosives a burn law that is checked when it is made."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Literal
+
+from warp_mpm.errors import InputError
+from warp_mpm.exact.chapman_jouguet import ChapmanJouguetState, chapman_jouguet_state, energy_for_speed
+from warp_mpm.kernels.burn import BurnLaw
+from warp_mpm.kernels.burn.programmed import ProgrammedBurn
+from warp_mpm.kernels.eos import EquationOfState
+from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.warp_startup import start_quietly
+
+ROUND_OFF = 1e-5  # relative difference of two speeds that are the same: single precision, and the digits people write
+TOLERANCE = 0.01  # relative difference that is adjusted; more is an error
+
+
+class OnMismatch(Enum):
+    """What to do with an explosive whose stated detonation speed is not the one its equation of state implies.
+
+    ADJUST: up to 1 % the wave runs at the implied speed, more is an error. KEEP: run as stated, with a warning.
+    """
+
+    ADJUST = "adjust"
+    KEEP = "keep"
+
+
+@dataclass(frozen=True)
+class Material:
+    """A material. Explosives are made by `explosive`, which checks them.
+
+    Raises:
+        InputError: density or energy is not a positive finite number.
+    """
+
+    name: str
+    density: float  # initial, rho0 [kg/m3]
+    equation_of_state: EquationOfState
+    specific_energy: float  # initial, chemical energy included [J/kg]
+    burn: BurnLaw | None = None  # None: inert, it is products from the start
+    cj: ChapmanJouguetState | None = None  # what the equation of state implies
+    warnings: tuple[str, ...] = ()  # what the check of the explosive has to say
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        _check_positive(self.name, "density", self.density, "kg/m3")
+        _check_positive(self.name, "specific_energy", self.specific_energy, "J/kg")
+
+
+def explosive(
+    name: str,
+    *,
+    density: float,
+    detonation_speed: float,
+    equation_of_state: EquationOfState,
+    energy: float | Literal["cj"] = "cj",
+    cj_pressure: float | None = None,
+    on_mismatch: OnMismatch = OnMismatch.ADJUST,
+) -> Material:
+    """An explosive with programmed burn, checked: does its equation of state detonate at the stated speed?
+
+    `density` [kg/m3] and `detonation_speed` [m/s] are those stated for it; `energy` [J/kg], or "cj" for the one that
+    the Chapman-Jouguet condition gives; `cj_pressure` [Pa] is compared if stated. A wave that runs faster than the
+    energy allows has a low front, and one that runs 0.5 % slower grows without bound, so they must match.
+
+    Raises:
+        InputError: a value is not positive and finite, or speed or pressure do not match the equation of state.
+    """
+    _check_positive(name, "density", density, "kg/m3")
+    _check_positive(name, "detonation_speed", detonation_speed, "m/s")
+    start_quietly()  # the check evaluates device functions, which starts Warp
+    if energy == "cj":
+        specific_energy = energy_for_speed(equation_of_state, density, detonation_speed)
+    else:
+        specific_energy = float(energy)
+        _check_positive(name, "energy", specific_energy, "J/kg")
+    state = chapman_jouguet_state(equation_of_state, density, specific_energy)
+    speed, warnings = _matched_speed(name, density, detonation_speed, equation_of_state, state, on_mismatch)
+    if cj_pressure is not None:
+        _check_positive(name, "cj_pressure", cj_pressure, "Pa")
+        warnings += _matched_pressure(name, cj_pressure, state, on_mismatch)
+    return Material(name, density, equation_of_state, specific_energy, ProgrammedBurn(speed), state, warnings)
+
+
+def ammonium_nitrate(*, energy: float | Literal["cj"] = "cj", on_mismatch: OnMismatch = OnMismatch.ADJUST) -> Material:
+    """The explosive of Wang et al. 2015: ANFO, rho0 1000 kg/m3, D 2800 m/s, gamma law with gamma = 2.
+
+    The paper states "about 3.8e6 J/kg", with which this gas would detonate at 4775 m/s; the Chapman-Jouguet condition
+    gives E0 = D^2 / (2 (gamma^2 - 1)) = 1.307e6 J/kg and p_CJ = 2.613 GPa, which the paper compares with.
+
+    Raises:
+        InputError: the energy does not match the speed, and `on_mismatch` is ADJUST.
+    """
+    return explosive(
+        "ammonium nitrate",
+        density=1000.0,
+        detonation_speed=2800.0,
+        equation_of_state=IdealGas(gamma=2.0),
+        energy=energy,
+        on_mismatch=on_mismatch,
+    )
+
+
+def _matched_speed(
+    name: str,
+    density: float,
+    stated: float,
+    equation_of_state: EquationOfState,
+    state: ChapmanJouguetState,
+    on_mismatch: OnMismatch,
+) -> tuple[float, tuple[str, ...]]:
+    """The speed at which the wave runs [m/s], and what there is to say about it."""
+    implied = state.detonation_speed
+    mismatch = abs(stated / implied - 1.0)
+    if mismatch <= ROUND_OFF:
+        return stated, ()
+    if on_mismatch is OnMismatch.KEEP:
+        consequence = "the front stays below p_CJ" if stated > implied else "the front grows without bound"
+        return stated, (
+            f"{name}: runs at the stated {stated:g} m/s, but its equation of state implies {implied:.0f} m/s: "
+            f"{consequence}",
+        )
+    if mismatch <= TOLERANCE:
+        return implied, (
+            f"{name}: runs at {implied:.1f} m/s, which its equation of state implies, not at the stated {stated:g} m/s",
+        )
+    consistent = energy_for_speed(equation_of_state, density, stated)
+    raise InputError(
+        f"{name}: detonation_speed: expected the {implied:.0f} m/s (to 1 %) that its equation of state implies with "
+        f"this energy, got {stated:g}; use energy={consistent:.4g} J/kg, energy=cj, or on_mismatch=keep to run it as is"
+    )
+
+
+def _matched_pressure(name: str, stated: float, state: ChapmanJouguetState, on_mismatch: OnMismatch) -> tuple[str, ...]:
+    """What there is to say about the stated Chapman-Jouguet pressure."""
+    if abs(stated / state.pressure - 1.0) <= TOLERANCE:
+        return ()
+    text = f"{name}: cj_pressure: expected {state.pressure:.4g} Pa (to 1 %), which its equation of state implies"
+    if on_mismatch is OnMismatch.ADJUST:
+        raise InputError(f"{text}, got {stated:.4g}; correct the parameters, or use on_mismatch=keep")
+    return (f"{text}, got {stated:.4g}",)
+
+
+def _check_positive(name: str, quantity: str, value: float, unit: str) -> None:
+    if not (isinstance(value, (int, float)) and 0.0 < value < math.inf):
+        raise InputError(f"{name}: {quantity}: expected a positive finite number of {unit}, got {value}")

@@ -1,0 +1,167 @@
+"""The model: what stays constant while a scene is solved, as the kernels take it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from warp_mpm.config import Order, ShapeFunction, SolverConfig, Transfer
+from warp_mpm.detonators import PlaneDetonator, PointDetonator
+from warp_mpm.kernels import material, shape, walls
+from warp_mpm.kernels.arrival import Ignition
+from warp_mpm.kernels.motion import Faces
+from warp_mpm.kernels.order import Slabs
+from warp_mpm.kernels.viscosity import Viscosity
+from warp_mpm.materials import Material
+from warp_mpm.scene import Charge, Scene, Wall
+
+DEFAULT_BURN_WIDTH = 3.0  # cells
+SLAB_THICKNESS = 16  # cells; two slabs of one parity stay apart while particles drift by less than 7
+LARGEST_DRIFT = 6.0  # cells that a particle may move between two sortings
+ACTIVE_MARGIN = 8  # cells around the particles that are worked on; more than the drift and the stencil
+
+WALL_CODES = {Wall.OPEN: walls.WALL_OPEN, Wall.SLIP: walls.WALL_SLIP, Wall.STICK: walls.WALL_STICK}
+SHAPES = {
+    ShapeFunction.LINEAR: shape.LINEAR,
+    ShapeFunction.GIMP: shape.GIMP,
+    ShapeFunction.BSPLINE: shape.BSPLINE,
+}
+STRAINS = {
+    Order.MUSL: material.Strain.REPROJECTED,
+    Order.USL: material.Strain.END,
+    Order.USF: material.Strain.START,
+}
+
+
+@dataclass(frozen=True)
+class ChargeModel:
+    """A charge, as the kernels take it."""
+
+    material: Material
+    eos_record: Any
+    burn_record: Any  # 0 for inert matter
+    half_width: float  # of a particle [cells]
+    ignitions: tuple[Ignition, ...]
+
+    @property
+    def eos_class(self) -> type:
+        """Class of the equation of state: kernels are composed for it, not for its parameters."""
+        return type(self.material.equation_of_state)
+
+    @property
+    def burn_class(self) -> type | None:
+        """Class of the burn law, None for inert matter."""
+        return None if self.material.burn is None else type(self.material.burn)
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything constant."""
+
+    scene: Scene
+    config: SolverConfig
+    device: wp.Device
+    burn_width: float  # [cells]
+    shape: shape.Shape
+    charges: tuple[ChargeModel, ...]
+    boundary: walls.Boundary
+    faces: Faces
+    viscosity: Viscosity
+    slabs: Slabs
+    slab_count: int
+
+    @property
+    def spacing(self) -> np.ndarray:
+        """Cell size per axis (3,) [m]."""
+        return np.array(self.scene.domain.spacing)
+
+    @property
+    def pic_share(self) -> float:
+        """Share of the grid's velocity that particles take over."""
+        return 1.0 if self.config.transfer is Transfer.APIC else self.config.pic_share
+
+    @property
+    def damped(self) -> bool:
+        """Whether the conservative damping acts."""
+        return self.config.transfer is Transfer.DAMPED_FLIP
+
+    @property
+    def affine(self) -> bool:
+        """Whether particles carry a velocity gradient."""
+        return self.config.transfer is Transfer.APIC
+
+    @property
+    def burns(self) -> bool:
+        """Whether any charge is an explosive."""
+        return any(charge.material.burn is not None for charge in self.charges)
+
+
+def build_model(scene: Scene, config: SolverConfig, device: wp.Device) -> Model:
+    """The model of a scene, solved as `config` says, on a device."""
+    burn_width = config.burn_width or scene.burn_width or DEFAULT_BURN_WIDTH
+    cells = np.array(scene.domain.cells)
+    slabs = Slabs()
+    slabs.axis = int(np.argmax(cells))
+    longest = int(cells[slabs.axis])
+    slabs.thickness = longest if device.is_cuda else SLAB_THICKNESS
+    slabs.charges = len(scene.charges)
+    return Model(
+        scene=scene,
+        config=config,
+        device=device,
+        burn_width=burn_width,
+        shape=SHAPES[config.shape],
+        charges=tuple(_charge_model(scene, charge, burn_width) for charge in scene.charges),
+        boundary=_boundary(scene),
+        faces=_faces(scene),
+        viscosity=_viscosity(scene, config),
+        slabs=slabs,
+        slab_count=-(-longest // slabs.thickness),
+    )
+
+
+def _charge_model(scene: Scene, charge: Charge, burn_width: float) -> ChargeModel:
+    burn = charge.material.burn
+    spacing = max(scene.domain.spacing)
+    per_axis = round((scene.domain.cell_volume / charge.particle_volume) ** (1 / 3))
+    return ChargeModel(
+        material=charge.material,
+        eos_record=charge.material.equation_of_state.record(),
+        burn_record=0 if burn is None else burn.record(burn_width, spacing),
+        half_width=0.5 / max(1, per_axis),
+        ignitions=tuple(_ignition(scene, d, spacing) for d in scene.detonators if charge.name in d.charges),
+    )
+
+
+def _ignition(scene: Scene, detonator: PointDetonator | PlaneDetonator, spacing: float) -> Ignition:
+    ignition = Ignition()
+    ignition.position = wp.vec3(*np.subtract(detonator.position, scene.domain.lower))
+    ignition.time = detonator.time
+    if isinstance(detonator, PlaneDetonator):
+        ignition.normal = wp.vec3(*(np.array(detonator.normal) / np.linalg.norm(detonator.normal)))
+    elif detonator.booster:
+        ignition.booster_radius = spacing
+    return ignition
+
+
+def _boundary(scene: Scene) -> walls.Boundary:
+    boundary = walls.Boundary()
+    for face, wall in enumerate(scene.walls.faces()):
+        boundary.wall[face] = int(WALL_CODES[wall])
+    boundary.gravity = wp.vec3(*scene.gravity)
+    return boundary
+
+
+def _faces(scene: Scene) -> Faces:
+    faces = Faces()
+    for face, wall in enumerate(scene.walls.faces()):
+        faces.open[face] = int(wall is Wall.OPEN)
+    return faces
+
+
+def _viscosity(scene: Scene, config: SolverConfig) -> Viscosity:
+    viscosity = Viscosity()
+    viscosity.quadratic, viscosity.linear = config.viscosity
+    viscosity.length = scene.domain.cell_volume ** (1 / 3)
+    return viscosity

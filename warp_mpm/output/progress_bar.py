@@ -1,0 +1,81 @@
+"""Shows the progress of a run: a bar with the time left on a terminal, a line every tenth of the run elsewhere."""
+
+import time as wall_clock
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from warp_mpm.progress import Progress as ProgressProtocol
+
+LINES = 10  # that a run without a terminal writes
+MICROSECOND = 1e-6  # [s]
+
+
+def progress_on(console: Console) -> ProgressProtocol:
+    """A bar if the console is a terminal, else plain lines."""
+    return ProgressBar(console) if console.is_terminal else ProgressLines(console)
+
+
+class ProgressBar:
+    """A bar that is redrawn in place, with the time left."""
+
+    def __init__(self, console: Console) -> None:
+        """A bar on `console`; it appears with the first update."""
+        self._console = console
+        self._bar = Progress(
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.description}", markup=False),
+            TimeRemainingColumn(compact=True, elapsed_when_finished=True),
+            console=console,
+        )
+
+    def message(self, text: str) -> None:
+        """Print a line above the bar."""
+        self._console.print(text, markup=False, highlight=False)
+
+    def update(self, time: float, end_time: float, step: int, note: str) -> None:
+        """Move the bar to `time` [s] of `end_time` [s]."""
+        if not self._bar.tasks:
+            self._bar.add_task("", total=end_time)
+            self._bar.start()
+        self._bar.update(self._bar.task_ids[0], completed=time, description=_state(time, end_time, step, note))
+
+    def close(self) -> None:
+        """Leave the bar as it is."""
+        self._bar.stop()
+
+
+class ProgressLines:
+    """A line at the start, at every tenth of the run, and at its end."""
+
+    def __init__(self, console: Console) -> None:
+        """Lines on `console`."""
+        self._console = console
+        self._started = 0.0  # [s]
+        self._printed = -1  # tenths of the run
+
+    def message(self, text: str) -> None:
+        """Print a line."""
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def update(self, time: float, end_time: float, step: int, note: str) -> None:
+        """Print a line if the run at `time` [s] of `end_time` [s] has entered another tenth."""
+        share = min(time / end_time, 1.0)
+        tenth = int(share * LINES)
+        if tenth == self._printed:
+            return
+        now = wall_clock.monotonic()
+        if self._printed < 0:
+            self._started = now
+        self._printed = tenth
+        left = f"  {(now - self._started) * (1.0 - share) / share:.0f} s left" if 0.0 < share < 1.0 else ""
+        self.message(f"{share:4.0%}  {_state(time, end_time, step, note)}{left}")
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+def _state(time: float, end_time: float, step: int, note: str) -> str:
+    """Where the run is, in a few words."""
+    return f"{time / MICROSECOND:.1f} of {end_time / MICROSECOND:.1f} us  step {step}  {note}"

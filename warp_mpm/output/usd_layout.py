@@ -1,0 +1,239 @@
+"""What the USD file is made of: its prims, its metadata, and everything in it that does not change in time.
+
+    /World                  Xform, kind component; time-sampled blast:time [s]
+    /World/particles        Points: points, extent, widths, ids, primvars pressure, displayColor and further fields
+    /World/section          Mesh: the field pressure on the scene's section plane
+    /World/detonators       one prim each, with position and ignition time
+    /World/camera           frames the charge
+    /World/materials        an emissive material that shows displayColor
+
+Pressures are in Pa, lengths in m. Primvars are float[], int[], float3[] or color3f[] only: one primvar of another type
+makes Blender drop the rest.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, Vt
+
+from warp_mpm.detonators import Detonator, PlaneDetonator
+from warp_mpm.output import colormap
+from warp_mpm.scene import Scene, Wall
+
+WORLD = "/World"
+PARTICLES = "/World/particles"
+SECTION = "/World/section"
+DETONATORS = "/World/detonators"
+CAMERA = "/World/camera"
+MATERIALS = "/World/materials"
+
+TIME_CODES_PER_SECOND = 24.0
+
+FIELD_UNITS = {"density": "kg/m3", "burn_fraction": "1", "arrival_time": "s", "particleVelocity": "m/s"}
+
+_FLOATS = Sdf.ValueTypeNames.FloatArray
+_INTEGERS = Sdf.ValueTypeNames.IntArray
+_VECTORS = Sdf.ValueTypeNames.Float3Array
+
+
+def animated_attributes(scene: Scene, fields: Sequence[str]) -> dict[str, Any]:
+    """Path and value type of every attribute that has a time sample per frame.
+
+    The widths are among them only where a face is open, because only there a particle can leave.
+    """
+    attributes = {
+        f"{WORLD}.blast:time": Sdf.ValueTypeNames.Double,
+        f"{PARTICLES}.points": Sdf.ValueTypeNames.Point3fArray,
+        f"{PARTICLES}.extent": _VECTORS,
+        f"{PARTICLES}.primvars:pressure": _FLOATS,
+        f"{PARTICLES}.primvars:displayColor:indices": _INTEGERS,
+        f"{SECTION}.primvars:pressure": _FLOATS,
+        f"{SECTION}.primvars:displayColor:indices": _INTEGERS,
+    }
+    if Wall.OPEN in scene.walls.faces():
+        attributes[f"{PARTICLES}.widths"] = _FLOATS
+    for name in fields:
+        attributes[f"{PARTICLES}.primvars:{name}"] = _field_type(name)
+    return attributes
+
+
+def author_stage_metadata(
+    layer: Any, scene: Scene, pressure_range: tuple[float, float], microseconds_per_time_code: float, frames: int
+) -> None:
+    """Say in the layer's header what the stage is: units, time codes of `frames` frames, what the colours mean."""
+    layer.defaultPrim = Sdf.Path(WORLD).name
+    layer.documentation = " ".join((scene.description or scene.name).split())
+    layer.timeCodesPerSecond = layer.framesPerSecond = TIME_CODES_PER_SECOND
+    layer.startTimeCode = 0.0
+    layer.endTimeCode = float(max(frames - 1, 0))
+    layer.pseudoRoot.SetInfo(UsdGeom.Tokens.upAxis, UsdGeom.Tokens.z)
+    layer.pseudoRoot.SetInfo(UsdGeom.Tokens.metersPerUnit, 1.0)
+    layer.customLayerData = {
+        "scene": scene.name,
+        "microsecondsPerTimeCode": microseconds_per_time_code,
+        "pressureUnit": "Pa",
+        "colorMap": colormap.NAME,
+        "colorRange": Gf.Vec2d(*pressure_range),
+    }
+
+
+def author_static(layer: Any, scene: Scene, fields: Sequence[str]) -> None:
+    """Author every prim, every value that does not change, and declare every attribute that does."""
+    stage = Usd.Stage.Open(layer)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    world = UsdGeom.Xform.Define(stage, WORLD).GetPrim()
+    Usd.ModelAPI(world).SetKind(Kind.Tokens.component)
+    world.CreateAttribute("blast:time", Sdf.ValueTypeNames.Double).SetDocumentation("physical time [s]")
+    stage.SetDefaultPrim(world)
+    material = _author_material(stage)
+    _author_particles(stage, scene, fields, material)
+    _author_section(stage, scene, material)
+    _author_detonators(stage, scene)
+    _author_camera(stage, scene)
+
+
+def particle_widths(scene: Scene) -> np.ndarray:
+    """Diameter at which each particle is drawn [m], (particles,) float32: the edge of a cube of its initial volume."""
+    widths = [np.full(len(charge.positions), np.cbrt(charge.particle_volume)) for charge in scene.charges]
+    return np.concatenate(widths).astype(np.float32)
+
+
+def section_axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates of the domain's nodes along the two axes of the section plane [m]: (nodes_u,), (nodes_v,) float64."""
+    domain = scene.domain
+    u, v = (np.linspace(domain.lower[a], domain.upper[a], domain.cells[a] + 1) for a in scene.section.in_plane)
+    return u, v
+
+
+def _author_particles(stage: Any, scene: Scene, fields: Sequence[str], material: Any) -> None:
+    points = UsdGeom.Points.Define(stage, PARTICLES)
+    points.CreatePointsAttr()
+    points.CreateExtentAttr()
+    points.CreateWidthsAttr(Vt.FloatArray.FromNumpy(particle_widths(scene)))
+    points.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+    points.CreateIdsAttr(Vt.Int64Array.FromNumpy(np.arange(scene.particle_count, dtype=np.int64)))
+    _declare_pressure(points)
+    for name in fields:
+        primvar = UsdGeom.PrimvarsAPI(points).CreatePrimvar(name, _field_type(name), UsdGeom.Tokens.vertex)
+        primvar.GetAttr().SetDocumentation(f"{name} [{FIELD_UNITS[name]}]")
+    UsdShade.MaterialBindingAPI.Apply(points.GetPrim()).Bind(material)
+
+
+def _author_section(stage: Any, scene: Scene, material: Any) -> None:
+    """The nodes of the domain in the section plane and the quadrilaterals between them, node (i, j) at i nodes_v + j."""
+    u, v = section_axes(scene)
+    plane = np.full((len(u), len(v), 3), scene.section.coordinate)
+    first, second = scene.section.in_plane
+    plane[..., first], plane[..., second] = u[:, None], v[None, :]
+    corner = (np.arange(len(u) - 1)[:, None] * len(v) + np.arange(len(v) - 1)).ravel()
+    quads = np.stack([corner, corner + len(v), corner + len(v) + 1, corner + 1], axis=1)
+
+    mesh = UsdGeom.Mesh.Define(stage, SECTION)
+    points = Vt.Vec3fArray.FromNumpy(plane.reshape(-1, 3).astype(np.float32))
+    mesh.CreatePointsAttr(points)
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(quads), 4, dtype=np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(quads.ravel().astype(np.int32)))
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateDoubleSidedAttr(True)
+    _declare_pressure(mesh)
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _declare_pressure(shape: Any) -> None:
+    """Give a shape its pressure, and the colours of the map for time-sampled indices to choose from."""
+    primvars = UsdGeom.PrimvarsAPI(shape)
+    pressure = primvars.CreatePrimvar("pressure", _FLOATS, UsdGeom.Tokens.vertex)
+    pressure.GetAttr().SetDocumentation("pressure [Pa]")
+    color = primvars.CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray, UsdGeom.Tokens.vertex)
+    color.Set(Vt.Vec3fArray.FromNumpy(colormap.linear_table()))
+    color.CreateIndicesAttr()
+
+
+def _author_detonators(stage: Any, scene: Scene) -> None:
+    UsdGeom.Scope.Define(stage, DETONATORS)
+    lower, upper = _charge_box(scene)
+    radius = 0.025 * float(np.linalg.norm(upper - lower))  # large enough to show through the side of a thin plate
+    for number, detonator in enumerate(scene.detonators):
+        prim = _author_detonator(stage, f"{DETONATORS}/detonator_{number}", detonator, radius)
+        UsdGeom.XformCommonAPI(prim).SetTranslate(Gf.Vec3d(*detonator.position))
+        time = prim.CreateAttribute("blast:ignitionTime", Sdf.ValueTypeNames.Double)
+        time.Set(detonator.time)
+        time.SetDocumentation("ignition [s]")
+
+
+def _author_detonator(stage: Any, path: str, detonator: Detonator, radius: float) -> Any:
+    """A point detonator is a small sphere, a plane one an Xform that knows its normal."""
+    if isinstance(detonator, PlaneDetonator):
+        prim = UsdGeom.Xform.Define(stage, path).GetPrim()
+        prim.CreateAttribute("blast:normal", Sdf.ValueTypeNames.Vector3f).Set(Gf.Vec3f(*detonator.normal))
+        return prim
+    sphere = UsdGeom.Sphere.Define(stage, path)
+    sphere.CreateRadiusAttr(radius)
+    sphere.CreateExtentAttr([Gf.Vec3f(-radius), Gf.Vec3f(radius)])
+    sphere.CreateDisplayColorAttr([Gf.Vec3f(0.0, 0.6, 1.0)])  # a blue that the colour map does not have
+    return sphere.GetPrim()
+
+
+def _author_material(stage: Any) -> Any:
+    """A surface that only glows, in the colours of displayColor: light and shadow would falsify them."""
+    UsdGeom.Scope.Define(stage, MATERIALS)
+    material = UsdShade.Material.Define(stage, f"{MATERIALS}/pressure")
+    reader = UsdShade.Shader.Define(stage, f"{MATERIALS}/pressure/color")
+    reader.CreateIdAttr("UsdPrimvarReader_float3")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+    color = reader.CreateOutput("result", Sdf.ValueTypeNames.Float3)
+    surface = UsdShade.Shader.Define(stage, f"{MATERIALS}/pressure/surface")
+    surface.CreateIdAttr("UsdPreviewSurface")
+    surface.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(color)
+    surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(0.0))
+    surface.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(1.0)
+    material.CreateSurfaceOutput().ConnectToSource(surface.CreateOutput("surface", Sdf.ValueTypeNames.Token))
+    return material
+
+
+def _author_camera(stage: Any, scene: Scene) -> None:
+    """A camera that sees the whole charge, from the side of the section plane's normal and a little round the corner."""
+    lower, upper = _charge_box(scene)
+    centre = 0.5 * (lower + upper)
+    axes = _camera_axes(scene, turn=math.radians(25.0), lift=math.radians(12.0))
+    signs = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1))).reshape(3, -1).T
+    corners = (0.5 * signs * (upper - lower)) @ axes.T  # (8, 3): right, up, towards the camera
+    half_view = 18.0 / 50.0  # half the aperture over the focal length
+    distance = 1.15 * float(np.max(corners[:, 2] + np.abs(corners[:, :2]).max(axis=1) / half_view))
+
+    camera = UsdGeom.Camera.Define(stage, CAMERA)
+    # Camera lengths are in tenths of a scene unit, here of a metre: a 50 mm lens and a square film of 36 mm.
+    camera.CreateFocalLengthAttr(0.5)
+    camera.CreateHorizontalApertureAttr(0.36)
+    camera.CreateVerticalApertureAttr(0.36)
+    camera.CreateFocusDistanceAttr(distance)
+    camera.CreateClippingRangeAttr(Gf.Vec2f(0.01 * distance, 100.0 * distance))
+    pose = np.eye(4)
+    pose[:3, :3] = axes  # USD multiplies row vectors from the left: the rows are where the camera's axes go
+    pose[3, :3] = centre + distance * axes[2]
+    camera.AddTransformOp().Set(Gf.Matrix4d(pose))
+
+
+def _camera_axes(scene: Scene, turn: float, lift: float) -> np.ndarray:
+    """Right, up and backward of a camera that looks along the section's normal, turned aside and lifted [rad]: (3, 3)."""
+    right, up = np.eye(3)[list(scene.section.in_plane)]
+    normal = np.cross(right, up)
+    backward = math.cos(lift) * (math.cos(turn) * normal + math.sin(turn) * right) + math.sin(lift) * up
+    sideways = np.cross(up, backward)
+    sideways /= np.linalg.norm(sideways)
+    return np.stack([sideways, np.cross(backward, sideways), backward])
+
+
+def _charge_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner of the box around all particles [m], (3,) float64 each."""
+    lower = np.min([charge.positions.min(axis=0) for charge in scene.charges], axis=0)
+    upper = np.max([charge.positions.max(axis=0) for charge in scene.charges], axis=0)
+    return lower, upper
+
+
+def _field_type(name: str) -> Any:
+    return _VECTORS if name == "particleVelocity" else _FLOATS

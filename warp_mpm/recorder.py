@@ -1,0 +1,158 @@
+"""The record of every step: peaks, the pressure around the front path and the collision points, and along the line.
+
+It is kept on the device and fetched in chunks, so that no step waits for the host.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warp_mpm.kernels.precision import scalar, vector3
+from warp_mpm.kernels.record import (
+    RECORD_DT,
+    RECORD_FIELD_PRESSURE,
+    RECORD_HEAD,
+    RECORD_PARTICLE_PRESSURE,
+    record_step,
+)
+from warp_mpm.output.frame import LineRecord
+from warp_mpm.scene import Domain, Segment, Vector
+from warp_mpm.state import State
+
+CHUNK = 512  # steps between two fetches
+PATH_REACH = 1.0  # cells around the front path in which its pressure is taken
+POINT_REACH = 2.0  # cells around a collision point
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """What was recorded, one row a step, the initial state first. Pressures in Pa, times in s."""
+
+    time: np.ndarray  # (steps,) float64
+    dt: np.ndarray  # (steps,)
+    particle_pressure: np.ndarray  # (steps,) highest of all particles
+    field_pressure: np.ndarray  # (steps,) highest of all nodes at least half filled
+    path_pressure: np.ndarray | None  # (steps,) highest within a cell of the front path
+    point_pressures: np.ndarray  # (steps, points) highest within two cells of each collision point
+    path: LineRecord | None  # along the front path
+    line: LineRecord | None  # along the scene's line
+
+
+class Recorder:
+    """Records a state, step by step."""
+
+    def __init__(self, state: State) -> None:
+        scene = state.model.scene
+        self._state = state
+        self._scene = scene
+        regions = [nodes_near_point(scene.domain, point, POINT_REACH) for point in scene.collision_points]
+        if scene.front_path is not None:
+            regions.insert(0, nodes_near_segment(scene.domain, scene.front_path, PATH_REACH))
+        self._path_points = sample_points(scene.domain, scene.front_path)
+        self._line_points = sample_points(scene.domain, scene.line)
+        points = np.concatenate([self._path_points, self._line_points])
+        cell, fraction = _cells_of(scene.domain, points)
+        device = state.device
+        self._regions = len(regions)
+        self._points = len(points)
+        flat = np.concatenate([np.zeros(1, np.int64), *(_flat(scene.domain, nodes) for nodes in regions)])
+        begins = 1 + np.concatenate([[0], np.cumsum([len(nodes) for nodes in regions])])
+        self._inputs = [
+            *(state.grid, state.clock, state.model.slab_count, state.maxima, state.slots, state.peaks),
+            wp.array(flat.astype(np.int32), dtype=int, device=device),
+            wp.array(begins.astype(np.int32), dtype=int, device=device),
+            wp.array(_flat(scene.domain, cell).astype(np.int32), dtype=int, device=device),
+            wp.array(fraction.astype(np.float32), dtype=vector3, device=device),
+        ]
+        self._times = wp.zeros(CHUNK, dtype=wp.float64, device=device)
+        self._rows = wp.zeros((CHUNK, RECORD_HEAD + self._regions + self._points), dtype=scalar, device=device)
+        self._fetched: list[tuple[np.ndarray, np.ndarray]] = []
+        self._first_step = 0
+        self._pending = 0
+
+    def record(self) -> None:
+        """Record the state as it is now: once before the first step, then after each."""
+        if self._pending == CHUNK:
+            self._fetch()
+        inputs = [*self._inputs, self._times, self._rows, self._first_step]
+        wp.launch(record_step, 1 + self._regions + self._points, inputs=inputs, device=self._state.device)
+        self._pending += 1
+
+    def peak_since_start(self) -> float:
+        """Highest field pressure recorded so far [Pa]."""
+        self._fetch()
+        return max((float(rows[:, RECORD_FIELD_PRESSURE].max()) for _, rows in self._fetched), default=0.0)
+
+    def result(self) -> StepRecord:
+        """Everything recorded so far."""
+        self._fetch()
+        time = np.concatenate([time for time, _ in self._fetched])
+        rows = np.concatenate([rows for _, rows in self._fetched])
+        has_path = self._scene.front_path is not None
+        first_point = RECORD_HEAD + self._regions
+        on_path = rows[:, first_point : first_point + len(self._path_points)]
+        on_line = rows[:, first_point + len(self._path_points) :]
+        return StepRecord(
+            time=time,
+            dt=rows[:, RECORD_DT],
+            particle_pressure=rows[:, RECORD_PARTICLE_PRESSURE],
+            field_pressure=rows[:, RECORD_FIELD_PRESSURE],
+            path_pressure=rows[:, RECORD_HEAD] if has_path else None,
+            point_pressures=rows[:, RECORD_HEAD + int(has_path) : first_point],
+            path=_line_record(time, self._path_points, on_path),
+            line=_line_record(time, self._line_points, on_line),
+        )
+
+    def _fetch(self) -> None:
+        if self._pending:
+            count = self._pending
+            self._fetched.append((self._times.numpy()[:count].copy(), self._rows.numpy()[:count].copy()))
+            self._first_step += count
+            self._pending = 0
+
+
+def sample_points(domain: Domain, segment: Segment | None) -> np.ndarray:
+    """Points along a segment, (n, 3) [m], about one a cell; none without a segment."""
+    if segment is None:
+        return np.empty((0, 3))
+    return segment.points(max(2, round(segment.length / min(domain.spacing)) + 1))
+
+
+def nodes_near_point(domain: Domain, point: Vector, reach: float) -> np.ndarray:
+    """Nodes (n, 3) of the domain within `reach` cells of a point."""
+    return nodes_near_segment(domain, Segment(point, point), reach)
+
+
+def nodes_near_segment(domain: Domain, segment: Segment, reach: float) -> np.ndarray:
+    """Nodes (n, 3) of the domain within `reach` cells of a segment; distances are taken in cells."""
+    start = np.subtract(segment.start, domain.lower) / domain.spacing
+    end = np.subtract(segment.end, domain.lower) / domain.spacing
+    low = np.maximum(np.floor(np.minimum(start, end) - reach), 0).astype(int)
+    high = np.minimum(np.ceil(np.maximum(start, end) + reach), domain.cells).astype(int)
+    axes = [np.arange(a, b + 1) for a, b in zip(low, high, strict=True)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    along = end - start
+    squared = float(along @ along)
+    share = np.clip((nodes - start) @ along / squared, 0.0, 1.0) if squared > 0.0 else np.zeros(len(nodes))
+    distance = np.linalg.norm(nodes - start - share[:, None] * along, axis=1)
+    return nodes[distance <= reach + 1e-9]
+
+
+def _cells_of(domain: Domain, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Cell (n, 3) and fraction of the cell (n, 3) of points in the domain."""
+    place = (points - domain.lower) / domain.spacing
+    cell = np.clip(np.floor(place), 0, np.array(domain.cells) - 1)
+    return cell.astype(int), np.clip(place - cell, 0.0, 1.0)
+
+
+def _flat(domain: Domain, nodes: np.ndarray) -> np.ndarray:
+    """Flat index of nodes (n, 3), as `kernels.records.node_index` counts."""
+    count_y, count_z = domain.cells[1] + 3, domain.cells[2] + 3
+    return ((nodes[:, 0] + 1) * count_y + nodes[:, 1] + 1) * count_z + nodes[:, 2] + 1
+
+
+def _line_record(time: np.ndarray, points: np.ndarray, pressure: np.ndarray) -> LineRecord | None:
+    if len(points) == 0:
+        return None
+    return LineRecord(time, np.linalg.norm(points - points[0], axis=1), pressure)

@@ -1,0 +1,359 @@
+"""The run: steps a scene to its end, saves what was asked for, audits itself, and sums up."""
+
+import math
+import os
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, fields
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warp_mpm.config import Save, SolverConfig
+from warp_mpm.conservation import Audit, Totals, history_row, totals_of
+from warp_mpm.errors import InputError, SimulationError
+from warp_mpm.launch import Launcher, find_device
+from warp_mpm.model import Model, build_model
+from warp_mpm.output.frame import Frame, SectionPicture
+from warp_mpm.progress import Progress, Silent
+from warp_mpm.recorder import Recorder, StepRecord
+from warp_mpm.scene import Scene
+from warp_mpm.section import section_pressure
+from warp_mpm.solver import Solver
+from warp_mpm.state import State, memory_needed
+from warp_mpm.summary import figures_of_merit, lit_explosive
+from warp_mpm.version import VERSION
+
+GROWTH = 1.1  # of the time step, at most; as in kernels.reduce
+MEMORY_SHARE = 0.9  # of the free memory that a run may take
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run gives back."""
+
+    summary: dict[str, Any]  # as in summary.json
+    history: list[dict[str, float]]  # as in history.csv, one row a frame
+    record: StepRecord  # every step
+    pictures: tuple[SectionPicture, ...]  # the section at the scene's picture instants
+    state: State  # at the end
+    output: Path | None  # the run directory
+
+
+def simulate(
+    scene: Scene,
+    *,
+    config: SolverConfig | None = None,
+    save: Save | None = None,
+    output: str | Path | None = None,
+    device: str | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Simulate a scene to its end time.
+
+    Args:
+        scene: what is simulated.
+        config: how; the defaults if not given.
+        save: when and what to save.
+        output: directory for the results, made if need be; nothing is written without it.
+        device: "cpu", "cuda:0", ...; a GPU if there is one.
+        threads: on a CPU; one a core.
+        progress: told how far the run is.
+
+    Raises:
+        InputError: unknown device, too little memory, or an output directory that cannot be written.
+        SimulationError: the run cannot go on.
+    """
+    begin = time.perf_counter()
+    run = _Run(scene, config or SolverConfig(), save or Save(), output, device, threads, progress or Silent())
+    run.to_the_end()
+    return run.finish(begin)
+
+
+class _Run:
+    """A run under way."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        config: SolverConfig,
+        save: Save,
+        output: str | Path | None,
+        device: str | None,
+        threads: int | None,
+        progress: Progress,
+    ) -> None:
+        self.scene = scene
+        self.save = save
+        self.progress = progress
+        self.launcher = Launcher(find_device(device), threads)
+        self.output = None if output is None else _writable_directory(Path(output))
+        self.model = build_model(scene, config, self.launcher.device)
+        _check_memory(self.model)
+        progress.message(
+            f"{scene.name}: {scene.particle_count:,} particles in {math.prod(scene.domain.cells):,} cells on "
+            f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}; preparing kernels"
+        )
+        self.state = State(self.model)
+        self.solver = Solver(self.model, self.state, self.launcher)
+        self.recorder = Recorder(self.state)
+        self.audit = Audit(np.array(scene.gravity), scene.mass)
+        self.history: list[dict[str, float]] = []
+        self.pictures: list[SectionPicture] = []
+        self.solver_seconds = 0.0
+        self.steps = 0
+
+    def to_the_end(self) -> None:
+        """Step to the end time; save frames and pictures at the first step at or past their instants."""
+        scene, end = self.scene, self.scene.end_time
+        frames = np.linspace(0.0, end, self.save.frames)
+        pictures = sorted(scene.picture_times)
+        self.recorder.record()
+        with self._writers() as write:
+            next_frame = self._save_due(write, frames, 0, pictures, 0.0)
+            now = 0.0
+            while now < end:
+                due = frames[next_frame]
+                now = self._advance(due)
+                next_frame = self._save_due(write, frames, next_frame, pictures, now)
+                peak = self.recorder_peak()
+                self.progress.update(now, end, self.steps, f"peak {peak / 1e9:.2f} GPa")
+
+    def recorder_peak(self) -> float:
+        """Highest field pressure in the latest row of the history [Pa]."""
+        return self.history[-1]["peak_pressure_pa"]
+
+    def finish(self, begin: float) -> Result:
+        """Sum up, draw, and write the summary."""
+        self.launcher.close()
+        record = self.recorder.result()
+        summary = self._summary(record, time.perf_counter() - begin)
+        if self.output is not None:
+            if self.save.figures:
+                self.progress.message("drawing figures")
+                self._draw(record, summary)
+            from warp_mpm.output.tables import write_summary
+
+            summary["wall_s"] = time.perf_counter() - begin
+            write_summary(self.output / "summary.json", summary)
+        return Result(summary, self.history, record, tuple(self.pictures), self.state, self.output)
+
+    def _advance(self, instant: float) -> float:
+        """Some steps towards an instant, not past the first step that reaches it; returns the time reached [s]."""
+        begin = time.perf_counter()
+        clock = self.state.clock_values()
+        for _ in range(self._safe_steps(instant - float(clock["time"]), float(clock["dt"]))):
+            self.solver.step()
+            self.recorder.record()
+            self.steps += 1
+        clock = self.state.clock_values()
+        self._check_faults()
+        self.solver.sort_if_due()
+        self.solver_seconds += time.perf_counter() - begin
+        return float(clock["time"])
+
+    def _safe_steps(self, left: float, dt: float) -> int:
+        """Steps that surely end before an instant that is `left` seconds away, then at least one.
+
+        On a CPU looking at the clock costs nothing. On a GPU it waits for all work, so several steps go out at once.
+        """
+        if not self.launcher.device.is_cuda or dt <= 0.0:
+            return 1
+        surely = math.floor(math.log1p((GROWTH - 1.0) * left / (GROWTH * dt)) / math.log(GROWTH))
+        return max(1, min(surely, 4))
+
+    def _check_faults(self) -> None:
+        """Stop when a particle moved absurdly far or out of the active cells.
+
+        Raises:
+            SimulationError: with the time, the step, the particle, its material and its position.
+        """
+        worst = int(self.state.faults.numpy().max())
+        if worst == 0:
+            return
+        index = worst - 1
+        clock = self.state.clock_values()
+        edges = np.cumsum([len(charge.positions) for charge in self.scene.charges])
+        charge = self.scene.charges[int(np.searchsorted(edges, index, side="right"))]
+        position = tuple(float(x) for x in self.state.positions()[index])
+        raise SimulationError(
+            f"{self.scene.name}: step {self.steps} at {clock['time'] * 1e6:.3f} us: particle {index} of {charge.name!r} "
+            f"({charge.material.name}) at {position} m moved out of its reach; try a smaller cfl, or the defaults"
+        )
+
+    def _save_due(self, write: Any, frames: np.ndarray, next_frame: int, pictures: list[float], now: float) -> int:
+        """Save the frames and pictures whose instants have come; returns the next frame."""
+        while pictures and now >= pictures[0]:
+            pictures.pop(0)
+            self.pictures.append(SectionPicture(now, section_pressure(self.state)))
+        if next_frame < len(frames) and now >= frames[next_frame]:
+            totals = totals_of(self.solver)
+            self.audit.add(totals)
+            pressure = self.state.field("pressure")
+            inside = self.state.field("mass") > 0.0
+            row = self._history_row(totals, pressure[inside])
+            while next_frame < len(frames) and now >= frames[next_frame]:
+                self.history.append(row)
+                write(next_frame, now, pressure, inside, row)
+                next_frame += 1
+        return next_frame
+
+    def _history_row(self, totals: Totals, pressure: np.ndarray) -> dict[str, float]:
+        clock = self.state.clock_values()
+        mean = float(pressure.mean()) if len(pressure) else 0.0
+        spread = float(pressure.std()) / mean if mean > 0.0 else 0.0
+        return history_row(totals, self.steps, float(clock["dt"]), self.recorder.peak_since_start(), spread)
+
+    @contextmanager
+    def _writers(self) -> Iterator[Any]:
+        """A function that writes a frame and a row of the history; files are closed whatever way the run ends."""
+        if self.output is None:
+            yield lambda *_: None
+            return
+        from warp_mpm.output.tables import HistoryWriter
+        from warp_mpm.output.usd import UsdWriter
+
+        with ExitStack() as stack:
+            usd = stack.enter_context(
+                UsdWriter(
+                    self.output / f"{self.scene.name}.usdc",
+                    self.scene,
+                    pressure_range=(0.0, color_limit(self.scene)),
+                    frames=self.save.frames,
+                    fields=self.save.fields,
+                )
+            )
+            history: list[HistoryWriter] = []
+
+            def write(index: int, now: float, pressure: np.ndarray, inside: np.ndarray, row: dict[str, float]) -> None:
+                if not history:
+                    path = self.output / "history.csv" if self.output else Path()
+                    history.append(stack.enter_context(HistoryWriter(path, list(row))))
+                history[0].write(row)
+                usd.write(self._frame(index, now, pressure, inside))
+
+            yield write
+
+    def _frame(self, index: int, now: float, pressure: np.ndarray, inside: np.ndarray) -> Frame:
+        sources = {"particleVelocity": "velocity"}
+        values = {name: self.state.field(sources.get(name, name)) for name in self.save.fields}
+        return Frame(index, now, self.state.positions(), pressure, inside, section_pressure(self.state), values)
+
+    def _draw(self, record: StepRecord, summary: dict[str, Any]) -> None:
+        """Draw the pictures; without matplotlib say so and go on."""
+        assert self.output is not None
+        try:
+            from warp_mpm.output import figures
+        except ImportError:
+            summary["warnings"].append("figures: not drawn, matplotlib is missing; pip install 'warp-mpm[figures]'")
+            return
+        directory = self.output / "figures"
+        directory.mkdir(exist_ok=True)
+        if self.pictures:
+            figures.section_figure(directory / "section.png", self.scene, self.pictures)
+        if record.line is not None:
+            figures.front_figure(directory / "front.png", self.scene, record.line)
+        figures.energy_figure(directory / "energy.png", self.history)
+
+    def _summary(self, record: StepRecord, wall: float) -> dict[str, Any]:
+        clock = self.state.clock_values()
+        final = self.history[-1]
+        materials = [warning for charge in self.scene.charges for warning in charge.material.warnings]
+        return {
+            "scene": self.scene.name,
+            "parameters": dict(self.scene.parameters),
+            "solver": _solver_values(self.model),
+            "version": VERSION,
+            "device": self.launcher.device.name,
+            "threads": self.launcher.threads,
+            "particles": self.scene.particle_count,
+            "cells": list(self.scene.domain.cells),
+            "steps": self.steps,
+            "end_time_s": float(clock["time"]),
+            "wall_s": wall,
+            "solver_wall_s": self.solver_seconds,
+            "ns_per_particle_step": 1e9 * self.solver_seconds / max(1, self.steps * self.scene.particle_count),
+            **figures_of_merit(self.scene, record),
+            "mass_error": self.audit.mass_error,
+            "momentum_error": self.audit.momentum_error,
+            "energy_error": self.audit.energy_error,
+            "min_dt_s": float(clock["smallest_dt"]),
+            "first_dt_s": float(clock["first_dt"]),
+            "mass_out_kg": {
+                name.removeprefix("mass_out_").removesuffix("_kg"): value
+                for name, value in final.items()
+                if name.startswith("mass_out_")
+            },
+            "pressure_spread": final["pressure_spread"],
+            "particle_volume_error": final["particle_volume_m3"] / sum(c.volume for c in self.scene.charges) - 1.0,
+            "warnings": list(dict.fromkeys([*self.scene.warnings, *materials])),
+        }
+
+
+def color_limit(scene: Scene) -> float:
+    """Pressure of the last colour [Pa]: 1.6 p_CJ shows fronts and collisions; without explosive, rho c^2."""
+    material = lit_explosive(scene)
+    if material is not None and material.cj is not None:
+        return 1.6 * material.cj.pressure
+    return max(c.material.density * c.material.specific_energy for c in scene.charges)
+
+
+def _solver_values(model: Model) -> dict[str, Any]:
+    """The settings as the summary shows them, the burn width resolved."""
+    values = {item.name: getattr(model.config, item.name) for item in fields(model.config)}
+    values = {name: value.value if isinstance(value, Enum) else value for name, value in values.items()}
+    return {**values, "burn_width": model.burn_width}
+
+
+def _writable_directory(path: Path) -> Path:
+    """Make the run directory, and try to write there before anything is computed.
+
+    Raises:
+        InputError: it cannot be made or written.
+    """
+    probe = path / ".warp_mpm_probe"
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise InputError(
+            f"output: expected a directory that can be written, got {str(path)!r} ({error.strerror}); "
+            "choose another one with -o"
+        ) from error
+    return path
+
+
+def _check_memory(model: Model) -> None:
+    """Refuse a run that does not fit into the free memory.
+
+    Raises:
+        InputError: with the numbers.
+    """
+    needed = memory_needed(model)
+    free = model.device.free_memory if model.device.is_cuda else _free_host_memory()
+    if free is not None and needed > MEMORY_SHARE * free:
+        raise InputError(
+            f"{model.scene.name}: expected a run that fits into the {free / 2**30:.1f} GiB of free memory, got "
+            f"{model.scene.particle_count:,} particles and {math.prod(model.scene.domain.cells):,} cells, which take "
+            f"{needed / 2**30:.1f} GiB; use a larger cell_size or fewer particles_per_axis"
+        )
+
+
+def _free_host_memory() -> int | None:
+    """Bytes that this machine can still give; None where the system does not tell."""
+    try:
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return int(line.split()[1]) * 1024
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" + ("" if count == 1 else "s")

@@ -1,0 +1,227 @@
+"""One step of the Material Point Method, as named phases.
+
+MUSL (the default): choose the time step | grid to particles, and their momentum back to the grid | strain, material
+and motion | particles to grid | solve the grid. The particles are scattered at the end of a step, so that the field
+pressure on the grid belongs to the same instant as the particles.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from warp_mpm.config import Order
+from warp_mpm.kernels import grid as grid_kernels
+from warp_mpm.kernels import material, motion, reduce, transfer
+from warp_mpm.launch import Launcher, Task
+from warp_mpm.model import LARGEST_DRIFT, STRAINS, ChargeModel, Model
+from warp_mpm.state import State
+
+STEPS_BETWEEN_SORTS = 20  # neighbours in memory stay neighbours on the grid for about as long
+
+
+class Solver:
+    """Advances a state, step by step."""
+
+    def __init__(self, model: Model, state: State, launcher: Launcher) -> None:
+        self.model = model
+        self.state = state
+        self.launcher = launcher
+        self.steps_since_sort = 0
+        self._record_clock()
+        self._record_ranges()
+        self._initialise()
+
+    def step(self) -> None:
+        """One step, of whatever length the state allows."""
+        self._start_step.launch()
+        if self.model.config.order is Order.USF:
+            self._scatter(self._scatter_momentum)
+            self._over_nodes(self._solve_momentum)
+            self._over_particles(self._update)
+            self._over_slabs(self._scatter_force)
+            self._over_nodes(self._solve_force)
+            self._collect_reactions.launch()
+            self._over_slabs(self._advance)
+            self._over_particles(self._move)
+        else:
+            self._collect_reactions.launch()
+            self._over_slabs(self._advance)
+            if self.model.config.order is Order.MUSL:
+                self._over_nodes(self._solve_reprojected)
+            self._over_particles(self._update)
+            self._scatter(self._scatter_all)
+            self._over_nodes(self._solve_all)
+        self._end_step.launch()
+        self.steps_since_sort += 1
+
+    def sort_if_due(self) -> None:
+        """Sort the particles before any of them can drift out of its slab's reach, and for locality."""
+        clock = self.state.clock_values()
+        # Twice the last step's way: the next one is at most a little longer.
+        drifting = clock["drift"] + 2.0 * clock["last_drift"] > LARGEST_DRIFT
+        if drifting or self.steps_since_sort >= STEPS_BETWEEN_SORTS:
+            self.sort()
+
+    def sort(self) -> None:
+        """Sort the particles, and record the launches for their new ranges."""
+        self.state.ranges = self.state.sort()
+        self.state.reset_drift()
+        self._record_ranges()
+        self.steps_since_sort = 0
+
+    def audit(self) -> tuple[np.ndarray, float]:
+        """Sums over the particles (`kernels.reduce` names the lanes), and the mass on the grid [kg]."""
+        state, model = self.state, self.model
+        sums = wp.zeros(model.slab_count * reduce.AUDIT, dtype=wp.float64, device=model.device)
+        for slab, charge, begin, count in self._groups():
+            energy = charge.material.specific_energy
+            inputs = [state.particles, state.grid.spacing, energy, sums, slab, begin]
+            wp.launch(reduce.audit_particles, count, inputs=inputs, device=model.device)
+        grid_mass = wp.zeros(1, dtype=wp.float64, device=model.device)
+        inputs = [state.grid, model.boundary, grid_mass, 0, 0]
+        wp.launch(reduce.audit_grid, state.active_nodes, inputs=inputs, device=model.device)
+        return sums.numpy().reshape(model.slab_count, reduce.AUDIT).sum(axis=0), float(grid_mass.numpy()[0])
+
+    def _initialise(self) -> None:
+        """Pressures and rates at the start, and the first scatter."""
+        state, model = self.state, self.model
+        for slab, charge, begin, count in self._groups():
+            wp.launch(
+                material.initial_kernel(charge.eos_class, charge.burn_class),
+                count,
+                inputs=[
+                    *(state.particles, charge.eos_record, charge.burn_record),
+                    *(model.viscosity, state.maxima, slab, begin),
+                ],
+                device=model.device,
+            )
+        self._scatter(self._scatter_all)
+        self._over_nodes(self._solve_all)
+
+    def _scatter(self, tasks: list[Task]) -> None:
+        """Empty the active nodes, and scatter onto them."""
+        self._over_nodes(self._clear)
+        self._over_slabs(tasks)
+
+    def _over_slabs(self, tasks: list[Task]) -> None:
+        """Particle work that writes to nodes: the even slabs, which share none, then the odd ones."""
+        self.launcher.run(tasks[0::2], self.state.count)
+        self.launcher.run(tasks[1::2], self.state.count)
+
+    def _over_particles(self, tasks: list[Task]) -> None:
+        """Particle work that writes to particles alone."""
+        self.launcher.run(tasks, self.state.count)
+
+    def _over_nodes(self, tasks: list[Task]) -> None:
+        """Work on nodes."""
+        self.launcher.run(tasks, self.state.active_nodes)
+
+    def _groups(self) -> Iterator[tuple[int, ChargeModel, int, int]]:
+        """Slab, charge, first particle and number of particles of each group that has any."""
+        for slab, row in enumerate(self.state.ranges):
+            for charge, (begin, count) in zip(self.model.charges, row, strict=True):
+                if count > 0:
+                    yield slab, charge, int(begin), int(count)
+
+    def _record_clock(self) -> None:
+        state, model = self.state, self.model
+        slabs = model.slab_count
+        self._start_step = self.launcher.record(
+            reduce.start_step,
+            1,
+            [state.clock, wp.vec3(*model.spacing), model.viscosity.length, model.config.cfl, slabs, state.maxima],
+        )
+        self._end_step = self.launcher.record(reduce.end_step, 1, [state.clock, slabs, state.maxima])
+        self._collect_reactions = self.launcher.record(
+            reduce.collect_reactions,
+            len(state.reactions),
+            [state.clock, state.reactions, state.pending_impulses, state.impulses],
+        )
+
+    def _record_ranges(self) -> None:
+        """Record every launch over particles and nodes, for the ranges that the last sorting gave."""
+        self._record_particle_phases()
+        self._record_node_phases()
+
+    def _record_particle_phases(self) -> None:
+        state, model = self.state, self.model
+        order, shape = model.config.order, model.shape
+        ambient = model.scene.ambient_pressure
+        strain = STRAINS[order]
+        blend = model.pic_share > 0.0
+        musl, usf = order is Order.MUSL, order is Order.USF
+
+        def scatter(momentum: bool, force: bool) -> list[Task]:
+            kernel = transfer.scatter_kernel(shape, momentum, force, model.affine)
+            return self._per_slab(
+                lambda slab, charge: (kernel, [state.particles, state.grid, charge.half_width, ambient])
+            )
+
+        advance = transfer.advance_kernel(shape, blend, model.affine, musl)
+        self._advance = self._per_slab(
+            lambda slab, charge: (
+                advance,
+                [state.particles, state.grid, state.clock, charge.half_width, model.pic_share],
+            )
+        )
+        self._update = self._per_slab(
+            lambda slab, charge: (
+                material.update_kernel(shape, strain, model.damped, not usf, charge.eos_class, charge.burn_class),
+                [
+                    *(state.particles, state.grid, model.faces, state.clock, charge.eos_record, charge.burn_record),
+                    *(model.viscosity, charge.half_width, ambient, state.maxima, state.tallies, state.faults, slab),
+                ],
+            )
+        )
+        self._scatter_all = scatter(momentum=True, force=True)
+        if usf:
+            self._scatter_momentum = scatter(momentum=True, force=False)
+            self._scatter_force = scatter(momentum=False, force=True)
+            move = motion.move_kernel(shape)
+            self._move = self._per_slab(
+                lambda slab, charge: (
+                    move,
+                    [
+                        *(state.particles, state.grid, model.faces, state.clock, charge.half_width),
+                        *(state.maxima, state.tallies, state.faults, slab),
+                    ],
+                )
+            )
+
+    def _record_node_phases(self) -> None:
+        state, model = self.state, self.model
+
+        def solve(momentum: bool, force: bool) -> list[Task]:
+            kernel = grid_kernels.solve_kernel(momentum, force)
+            walls = [state.reactions, state.pending_impulses, state.peaks]
+            return self._per_slot(kernel, lambda slot: [state.grid, model.boundary, model.pic_share, *walls, slot])
+
+        self._clear = self._per_slot(grid_kernels.clear, lambda slot: [state.grid])
+        self._solve_all = solve(momentum=True, force=True)
+        if model.config.order is Order.USF:
+            self._solve_momentum = solve(momentum=True, force=False)
+            self._solve_force = solve(momentum=False, force=True)
+        self._solve_reprojected = self._per_slot(
+            grid_kernels.solve_reprojected, lambda slot: [state.grid, model.boundary, state.clock, state.impulses, slot]
+        )
+
+    def _per_slab(self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]]) -> list[Task]:
+        """One task for each slab, with one recorded launch for each charge that has particles there."""
+        tasks: list[list[Any]] = [[] for _ in range(self.model.slab_count)]
+        for slab, charge, begin, count in self._groups():
+            kernel, inputs = phase(slab, charge)
+            tasks[slab].append(self.launcher.record(kernel, count, [*inputs, begin]))
+        return list(tasks)
+
+    def _per_slot(self, kernel: wp.Kernel, inputs: Callable[[int], list[Any]]) -> list[Task]:
+        """The active nodes, cut into as many tasks as there are slots."""
+        total = self.state.active_nodes
+        edges = [total * slot // self.state.slots for slot in range(self.state.slots + 1)]
+        return [
+            [self.launcher.record(kernel, end - begin, [*inputs(slot), begin])]
+            for slot, (begin, end) in enumerate(itertools.pairwise(edges))
+            if end > begin
+        ]

@@ -1,0 +1,217 @@
+"""The state: what changes while a scene is solved, in arrays on the device."""
+
+import numpy as np
+import warp as wp
+
+from warp_mpm.kernels import arrival, order
+from warp_mpm.kernels.precision import NEVER, matrix3, scalar, vector3, vector4, vector8
+from warp_mpm.kernels.records import TALLIES, Clock, Grid, Maxima, Particles
+from warp_mpm.kernels.walls import REACTIONS
+from warp_mpm.model import ACTIVE_MARGIN, Model
+
+GRID_SLOTS = 8  # pieces into which the work on nodes is cut on a CPU
+LIGHT = 1e-14  # of a particle's mass: nodes with less count as empty
+LAST_FRACTION = np.float32(0.99999994)  # the largest number below one in single precision
+
+FRACTION_OF_MEMORY = 0.9  # that a run may take of what is free
+
+PARTICLE_ARRAYS = (
+    "cell",
+    "fraction",
+    "velocity",
+    "affine",
+    "mass",
+    "density",
+    "energy",
+    "pressure",
+    "viscous_pressure",
+    "burn_fraction",
+    "arrival_time",
+    "booster_time",
+    "index",
+)
+
+
+class State:
+    """Particles, grid, clock, and what the kernels reduce and tally."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.device = model.device
+        self.slots = 1 if model.device.is_cuda else GRID_SLOTS
+        self.count = model.scene.particle_count
+        self.grid = _allocate_grid(model)
+        self.particles = _place_particles(model)
+        self.clock = _start_clock(model)
+        self.maxima = wp.zeros(model.slab_count, dtype=Maxima, device=self.device)
+        self.tallies = wp.zeros(model.slab_count * TALLIES, dtype=wp.float64, device=self.device)
+        self.faults = wp.zeros(model.slab_count, dtype=int, device=self.device)
+        self.reactions = wp.zeros(self.slots * REACTIONS, dtype=wp.float64, device=self.device)
+        self.pending_impulses = wp.zeros_like(self.reactions)
+        self.impulses = wp.zeros_like(self.reactions)
+        self.peaks = wp.zeros(self.slots, dtype=scalar, device=self.device)
+        charge = np.repeat(
+            np.arange(len(model.scene.charges), dtype=np.int16), [len(c.positions) for c in model.scene.charges]
+        )
+        self._charge: wp.array = wp.array(charge, dtype=wp.int16, device=self.device)
+        # Twice the count: the sort uses the second half as its scratch.
+        self._keys = wp.zeros(2 * self.count, dtype=wp.int64, device=self.device)
+        self._order = wp.zeros(2 * self.count, dtype=int, device=self.device)
+        self._light()
+        self.ranges = self.sort()
+
+    def sort(self) -> np.ndarray:
+        """Sort the particles by (slab, charge, cell), and fit the active cells around them.
+
+        Returns:
+            (slabs, charges, 2) first particle and number of particles of each group.
+        """
+        model, n = self.model, self.count
+        wp.launch(
+            order.sort_keys,
+            n,
+            inputs=[self.particles, self.grid, model.slabs, self._charge, self._keys, self._order],
+            device=self.device,
+        )
+        wp.utils.radix_sort_pairs(self._keys, self._order, n)
+        for name in PARTICLE_ARRAYS:
+            source = getattr(self.particles, name)
+            if len(source) == n:
+                target = wp.empty_like(source)
+                wp.launch(order.permute, n, inputs=[source, self._order, target], device=self.device)
+                setattr(self.particles, name, target)
+        groups = model.slab_count * len(model.charges)
+        starts = wp.zeros(groups + 1, dtype=int, device=self.device)
+        cells = int(np.prod(model.scene.domain.cells))
+        wp.launch(order.group_starts, n + 1, inputs=[self._keys, n, wp.int64(cells), starts], device=self.device)
+        first = starts.numpy()
+        self._fit_active_cells()
+        return np.stack([first[:-1], np.diff(first)], axis=1).reshape(model.slab_count, len(model.charges), 2)
+
+    @property
+    def active_nodes(self) -> int:
+        """Number of nodes that are worked on, ghosts included."""
+        lower, upper = np.array(self.grid.active_lower), np.array(self.grid.active_upper)
+        return int(np.prod(upper - lower + 3))
+
+    def clock_values(self) -> np.void:
+        """The clock's fields, by name."""
+        return self.clock.numpy()[0]
+
+    def reset_drift(self) -> None:
+        """The particles have just been sorted."""
+        values = self.clock.numpy().copy()
+        values["drift"] = 0.0
+        self.clock.assign(values)
+
+    def positions(self) -> np.ndarray:
+        """Positions of all particles (n, 3) float32 [m], in creation order."""
+        cell = self.particles.cell.numpy().astype(np.float64)
+        place = (cell + self.particles.fraction.numpy()) * self.model.spacing + self.model.scene.domain.lower
+        return self.in_creation_order(place.astype(np.float32))
+
+    def in_creation_order(self, values: np.ndarray) -> np.ndarray:
+        """Reorder per-particle values from memory order to creation order."""
+        result = np.empty_like(values)
+        result[self.particles.index.numpy()] = values
+        return result
+
+    def field(self, name: str) -> np.ndarray:
+        """A particle array of `Particles`, in creation order."""
+        return self.in_creation_order(getattr(self.particles, name).numpy())
+
+    def _light(self) -> None:
+        """Set arrival and booster times from the detonators; particles are in creation order here."""
+        begin = 0
+        for charge_model, charge in zip(self.model.charges, self.model.scene.charges, strict=True):
+            count = len(charge.positions)
+            if charge_model.ignitions and charge.material.burn is not None:
+                ignitions: wp.array = wp.array(list(charge_model.ignitions), dtype=arrival.Ignition, device=self.device)
+                wp.launch(
+                    arrival.light,
+                    count,
+                    inputs=[self.particles, self.grid, ignitions, charge.material.burn.detonation_speed, begin],
+                    device=self.device,
+                )
+            begin += count
+
+    def _fit_active_cells(self) -> None:
+        """Grow the active cells to hold all particles and what they may move until the next sorting; never shrink.
+
+        Shrinking would leave old values in nodes that nobody clears any more.
+        """
+        high = 2**30
+        bounds: wp.array = wp.array([high, high, high, -1, -1, -1], dtype=int, device=self.device)
+        wp.launch(order.cell_bounds, self.count, inputs=[self.particles, bounds], device=self.device)
+        values = bounds.numpy()
+        if values[3] < 0:
+            return
+        cells = np.array(self.model.scene.domain.cells)
+        lower = np.maximum(values[:3] - ACTIVE_MARGIN, 0)
+        upper = np.minimum(values[3:] + 1 + ACTIVE_MARGIN, cells)
+        if np.array(self.grid.active_upper).any():
+            lower = np.minimum(lower, np.array(self.grid.active_lower))
+            upper = np.maximum(upper, np.array(self.grid.active_upper))
+        self.grid.active_lower = wp.vec3i(*lower.tolist())
+        self.grid.active_upper = wp.vec3i(*upper.tolist())
+
+
+def memory_needed(model: Model) -> int:
+    """Bytes that a state of this model takes on its device."""
+    particle = 6 + 2 * 12 + 9 * 4 + 12 + 24 + (36 if model.affine else 0)
+    node = 8 * 4 + 4 + 4 * 4
+    nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
+    return int(model.scene.particle_count * particle + nodes * node)
+
+
+def _allocate_grid(model: Model) -> Grid:
+    cells = model.scene.domain.cells
+    counts = [n + 3 for n in cells]
+    total = counts[0] * counts[1] * counts[2]
+    grid = Grid()
+    grid.node = wp.zeros(total, dtype=vector8, device=model.device)
+    grid.pressure = wp.zeros(total, dtype=scalar, device=model.device)
+    grid.reprojected = wp.zeros(total, dtype=vector4, device=model.device)
+    grid.cells = wp.vec3i(*cells)
+    grid.stride_x = counts[1] * counts[2]
+    grid.stride_y = counts[2]
+    grid.spacing = vector3(*model.spacing)
+    grid.light_mass = LIGHT * min(c.material.density * c.particle_volume for c in model.scene.charges)
+    return grid
+
+
+def _place_particles(model: Model) -> Particles:
+    """Particles in creation order, at rest, at their initial density and energy."""
+    scene, device = model.scene, model.device
+    positions = np.concatenate([charge.positions for charge in scene.charges])
+    n = len(positions)
+    place = (positions - scene.domain.lower) / model.spacing
+    cell = np.clip(np.floor(place), 0, np.array(scene.domain.cells) - 1)
+    fraction = np.clip((place - cell).astype(np.float32), 0.0, LAST_FRACTION)
+
+    def per_charge(values: list[float]) -> wp.array:
+        repeated = np.repeat(np.array(values, dtype=np.float32), [len(c.positions) for c in scene.charges])
+        return wp.array(repeated, dtype=scalar, device=device)
+
+    burning = n if model.burns else 0
+    particles = Particles()
+    particles.cell = wp.array(cell.astype(np.int16), dtype=wp.vec3s, device=device)
+    particles.fraction = wp.array(fraction, dtype=vector3, device=device)
+    particles.velocity = wp.zeros(n, dtype=vector3, device=device)
+    particles.affine = wp.zeros(n if model.affine else 0, dtype=matrix3, device=device)
+    particles.mass = per_charge([c.material.density * c.particle_volume for c in scene.charges])
+    particles.density = per_charge([c.material.density for c in scene.charges])
+    particles.energy = per_charge([c.material.specific_energy for c in scene.charges])
+    particles.pressure = wp.zeros(n, dtype=scalar, device=device)
+    particles.viscous_pressure = wp.zeros(n, dtype=scalar, device=device)
+    particles.burn_fraction = wp.zeros(burning, dtype=scalar, device=device)
+    particles.arrival_time = wp.full(burning, NEVER, dtype=scalar, device=device)
+    particles.booster_time = wp.full(burning, NEVER, dtype=scalar, device=device)
+    particles.index = wp.array(np.arange(n, dtype=np.int32), dtype=int, device=device)
+    return particles
+
+
+def _start_clock(model: Model) -> wp.array:
+    clock = Clock()
+    clock.end_time = model.scene.end_time
+    return wp.array([clock], dtype=Clock, device=model.device)

@@ -1,0 +1,109 @@
+"""The figures of a run: how fast and how high the front was, against Chapman-Jouguet theory."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warp_mpm.detonators import PlaneDetonator
+from warp_mpm.materials import Material
+from warp_mpm.output.frame import LineRecord
+from warp_mpm.recorder import StepRecord
+from warp_mpm.scene import Scene
+
+ARRIVAL_SHARE = 0.05  # of p_CJ: the front has arrived at a point when the field pressure there reaches it
+FITTED_PART = (0.1, 1.0)  # of the front path: what the burning start of the wave does is left out
+PLATEAU_PART = (0.5, 0.9)  # of the travel time: when the front pressure is taken
+
+
+@dataclass(frozen=True)
+class FrontSpeed:
+    """Straight-line fit of the front's arrival along the front path."""
+
+    speed: float  # [m/s]
+    residual: float  # largest distance of an arrival from the line [m]
+    offset: float  # how far ahead of (+) or behind (-) the ideal wave the line is at the path's middle [m]
+
+
+def lit_explosive(scene: Scene) -> Material | None:
+    """The explosive that the first detonator lights, or the first explosive; None without one."""
+    explosives = {charge.name: charge.material for charge in scene.charges if charge.material.burn is not None}
+    for detonator in scene.detonators:
+        for name in detonator.charges:
+            if name in explosives:
+                return explosives[name]
+    return next(iter(explosives.values()), None)
+
+
+def ideal_arrival(scene: Scene, points: np.ndarray, speed: float) -> np.ndarray:
+    """Arrival times (n,) [s] of straight waves at points (n, 3): min over detonators of t_i + distance / D."""
+    arrival = np.full(len(points), np.inf)
+    for detonator in scene.detonators:
+        away = points - np.array(detonator.position)
+        if isinstance(detonator, PlaneDetonator):
+            distance = np.abs(away @ np.array(detonator.normal)) / np.linalg.norm(detonator.normal)
+        else:
+            distance = np.linalg.norm(away, axis=1)
+        arrival = np.minimum(arrival, detonator.time + distance / speed)
+    return arrival
+
+
+def arrival_times(record: LineRecord, threshold: float) -> np.ndarray:
+    """When the pressure at each point of a line first reached a threshold [s], interpolated in time; NaN if never."""
+    reached = record.pressure >= threshold
+    step = np.argmax(reached, axis=0)
+    points = np.arange(reached.shape[1])
+    before = np.maximum(step - 1, 0)
+    low, high = record.pressure[before, points], record.pressure[step, points]
+    share = np.where(high > low, (threshold - low) / np.where(high > low, high - low, 1.0), 1.0)
+    times = record.time[before] + share * (record.time[step] - record.time[before])
+    return np.where(reached.any(axis=0), times, np.nan)
+
+
+def front_speed(scene: Scene, record: StepRecord, material: Material) -> FrontSpeed | None:
+    """Speed of the front along the front path; None if it did not run far enough to tell."""
+    if record.path is None or material.cj is None or material.burn is None:
+        return None
+    distance = record.path.distance
+    arrived = arrival_times(record.path, ARRIVAL_SHARE * material.cj.pressure)
+    low, high = (share * distance[-1] for share in FITTED_PART)
+    used = np.isfinite(arrived) & (distance >= low) & (distance <= high)
+    if used.sum() < 3:
+        return None
+    time = arrived[used]
+    speed, start = np.polyfit(time, distance[used], 1)
+    residual = float(np.abs(distance[used] - (speed * time + start)).max())
+    assert scene.front_path is not None
+    ideal = ideal_arrival(scene, scene.front_path.points(len(distance))[used], material.burn.detonation_speed)
+    offset = float(material.burn.detonation_speed * np.mean(ideal - time))
+    return FrontSpeed(float(speed), residual, offset)
+
+
+def front_pressure(scene: Scene, record: StepRecord, material: Material) -> float | None:
+    """Median over steps of the highest field pressure around the front path, late on its way [Pa]."""
+    if record.path_pressure is None or material.burn is None or scene.front_path is None:
+        return None
+    ends = np.array([scene.front_path.start, scene.front_path.end])
+    start, end = ideal_arrival(scene, ends, material.burn.detonation_speed)
+    first, last = (start + share * (end - start) for share in PLATEAU_PART)
+    used = (record.time >= first) & (record.time <= last)
+    return float(np.median(record.path_pressure[used])) if used.any() else None
+
+
+def figures_of_merit(scene: Scene, record: StepRecord) -> dict[str, object]:
+    """The keys of summary.json that compare the run with theory; None where they do not apply."""
+    material = lit_explosive(scene)
+    state = material.cj if material is not None else None
+    fit = front_speed(scene, record, material) if material is not None else None
+    collisions = [float(value) for value in record.point_pressures.max(axis=0)]
+    return {
+        "p_cj_pa": state.pressure if state else None,
+        "detonation_speed_m_s": material.burn.detonation_speed if material and material.burn else None,
+        "front_pressure_pa": front_pressure(scene, record, material) if material is not None else None,
+        "front_speed_m_s": fit.speed if fit else None,
+        "front_fit_residual_m": fit.residual if fit else None,
+        "front_offset_m": fit.offset if fit else None,
+        "collision_pressure_pa": max(collisions) if collisions else None,
+        "collision_pressures_pa": collisions,
+        "peak_pressure_pa": float(record.field_pressure.max()),
+        "max_particle_pressure_pa": float(record.particle_pressure.max()),
+    }
