@@ -95,7 +95,8 @@ def raise_maximum(maxima: wp.array(dtype=scalar), index: int, value: scalar):
 def raise_maxima(maxima: wp.array(dtype=Maxima), slab: int, values: Maxima):
     """The same for all lanes of a slab."""
     known = maxima[slab]
-    if wp.max(known, values) != known:
+    nothing_new = wp.max(known, values) == known
+    if not nothing_new:
         wp.atomic_max(maxima, slab, values)
 
 

@@ -12,8 +12,7 @@ def section_pressure(state: State) -> np.ndarray:
     """
     scene = state.model.scene
     domain, plane = scene.domain, scene.section
-    shape = tuple(n + 3 for n in domain.cells)
-    pressure = state.grid.pressure.numpy().reshape(shape)[1:-1, 1:-1, 1:-1]
+    pressure = state.field_pressure()
     place = (plane.coordinate - domain.lower[plane.axis]) / domain.spacing[plane.axis]
     below = int(np.clip(np.floor(place), 0, domain.cells[plane.axis] - 1))
     share = np.float32(place - below)

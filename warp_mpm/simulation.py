@@ -181,8 +181,8 @@ class _Run:
         charge = self.scene.charges[int(np.searchsorted(edges, index, side="right"))]
         position = tuple(float(x) for x in self.state.positions()[index])
         raise SimulationError(
-            f"{self.scene.name}: step {self.steps} at {clock['time'] * 1e6:.3f} us: particle {index} of {charge.name!r} "
-            f"({charge.material.name}) at {position} m moved out of its reach; try a smaller cfl, or the defaults"
+            f"{self.scene.name}: step {self.steps} at {clock['time'] * 1e6:.3f} us: particle {index} of "
+            f"{charge.name!r} ({charge.material.name}) at {position} m moved out of its reach; try a smaller cfl, or the defaults"
         )
 
     def _save_due(self, write: Any, frames: np.ndarray, next_frame: int, pictures: list[float], now: float) -> int:
@@ -262,7 +262,6 @@ class _Run:
     def _summary(self, record: StepRecord, wall: float) -> dict[str, Any]:
         clock = self.state.clock_values()
         final = self.history[-1]
-        materials = [warning for charge in self.scene.charges for warning in charge.material.warnings]
         return {
             "scene": self.scene.name,
             "parameters": dict(self.scene.parameters),
@@ -290,7 +289,7 @@ class _Run:
             },
             "pressure_spread": final["pressure_spread"],
             "particle_volume_error": final["particle_volume_m3"] / sum(c.volume for c in self.scene.charges) - 1.0,
-            "warnings": list(dict.fromkeys([*self.scene.warnings, *materials])),
+            "warnings": list(self.scene.warnings),
         }
 
 

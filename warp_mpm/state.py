@@ -13,8 +13,6 @@ GRID_SLOTS = 8  # pieces into which the work on nodes is cut on a CPU
 LIGHT = 1e-14  # of a particle's mass: nodes with less count as empty
 LAST_FRACTION = np.float32(0.99999994)  # the largest number below one in single precision
 
-FRACTION_OF_MEMORY = 0.9  # that a run may take of what is free
-
 PARTICLE_ARRAYS = (
     "cell",
     "fraction",
@@ -119,6 +117,11 @@ class State:
     def field(self, name: str) -> np.ndarray:
         """A particle array of `Particles`, in creation order."""
         return self.in_creation_order(getattr(self.particles, name).numpy())
+
+    def field_pressure(self) -> np.ndarray:
+        """Field pressure at the nodes of the domain (nx + 1, ny + 1, nz + 1) [Pa]; a view on a CPU."""
+        shape = tuple(n + 3 for n in self.model.scene.domain.cells)
+        return self.grid.pressure.numpy().reshape(shape)[1:-1, 1:-1, 1:-1]
 
     def _light(self) -> None:
         """Set arrival and booster times from the detonators; particles are in creation order here."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -95,10 +96,7 @@ def section_figure(
             axes.set_xlabel(f"{first} [mm]")
         for axes in panels[:, 0]:
             axes.set_ylabel(f"{second} [mm]")
-        bar = figure.colorbar(image, ax=panels, extend="max", shrink=0.8, aspect=28, pad=0.02)
-        bar.set_label("pressure [GPa]")
-        bar.outline.set_linewidth(0.6)
-        _mark_theory(bar.ax, scene, upper)
+        _draw_color_bar(figure, image, panels, scene, shrink=0.8)
         _save(figure, path)
 
 
@@ -138,13 +136,10 @@ def front_figure(
         axes.set_xlabel("distance along the line [mm]")
         axes.set_ylabel("time [µs]")
         peak.plot(distance, record.pressure.max(axis=0) / GIGAPASCAL, color=SERIES[0])
-        peak.set_ylabel("highest\n[GPa]")
-        peak.set_ylim(bottom=0.0)
-        _mark_theory(peak, scene, math.inf)
-        bar = figure.colorbar(image, ax=axes, extend="max", aspect=28, pad=0.02)
-        bar.set_label("pressure [GPa]")
-        bar.outline.set_linewidth(0.6)
-        _mark_theory(bar.ax, scene, upper)
+        peak.set_ylabel("peak [GPa]")
+        peak.set_ylim(0.0, 1.1 * float(record.pressure.max()) / GIGAPASCAL)
+        _draw_theory(peak, scene)
+        _draw_color_bar(figure, image, axes, scene, shrink=1.0)
         _save(figure, path)
 
 
@@ -176,7 +171,7 @@ def energy_figure(path: str | Path, history: Sequence[Mapping[str, float]]) -> N
         _save(figure, path)
 
 
-def _style():  # type of the context is matplotlib's own
+def _style() -> AbstractContextManager[None]:
     import matplotlib
 
     return matplotlib.rc_context(STYLE)
@@ -193,7 +188,7 @@ def _save(figure: Figure, path: str | Path) -> None:
 
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        FigureCanvasAgg(figure).print_figure(str(path), format="png")
+        FigureCanvasAgg(figure).print_figure(str(path), format="png", bbox_inches="tight", pad_inches=0.05)
     except OSError as error:
         raise SimulationError(
             f"cannot write {path}: {error.strerror or error}; free some space, or choose another output directory"
@@ -242,7 +237,7 @@ def _draw_detonator(axes: Axes, detonator: Detonator, in_plane: tuple[int, int],
         if along != (0.0, 0.0):
             axes.axline(at, (at[0] + along[0], at[1] + along[1]), color=MARK, linewidth=1.0)
         return
-    axes.plot(*at, "o", markersize=5.0, color=MARK, markerfacecolor=face, markeredgewidth=1.0, clip_on=False, zorder=5)
+    axes.plot(*at, "o", markersize=4.0, color=MARK, markerfacecolor=face, markeredgewidth=1.0, clip_on=False, zorder=5)
 
 
 def _draw_outline(axes: Axes, scene: Scene) -> None:
@@ -307,7 +302,7 @@ def _profiles(scene: Scene, pictures: Sequence[SectionPicture]) -> Figure:
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel(f"{_AXIS_NAMES[long_axis]} [mm]")
     axes.set_ylabel("pressure [GPa]")
-    _mark_theory(axes, scene, math.inf)
+    _draw_theory(axes, scene)
     figure.legend(loc="outside right upper")
     return figure
 
@@ -327,19 +322,16 @@ def _draw_fronts(axes: Axes, scene: Scene, record: LineRecord) -> None:
     if len(speeds) != 1 or scene.line is None:
         return
     speed = speeds.pop()
-    along = record.distance[:, None] / scene.line.length
-    points = (1.0 - along) * np.array(scene.line.start) + along * np.array(scene.line.end)
+    along = np.linspace(record.distance[0], record.distance[-1], 1000)  # finer than the record: the corners stay sharp
+    share = along[:, None] / scene.line.length
+    points = (1.0 - share) * np.array(scene.line.start) + share * np.array(scene.line.end)
     arrival = np.min([_arrival(detonator, points, speed) for detonator in scene.detonators], axis=0)
-    axes.plot(
-        record.distance / MILLIMETRE,
-        arrival / MICROSECOND,
-        color=MARK,
-        linewidth=0.9,
-        linestyle=(0, (6, 3)),
-        label=f"fronts at D = {speed:.0f} m/s",
-    )
+    label = f"fronts at D = {speed:.0f} m/s"
+    axes.plot(along / MILLIMETRE, arrival / MICROSECOND, color=MARK, linewidth=0.9, linestyle=(0, (6, 3)), label=label)
     axes.set_ylim(record.time[0] / MICROSECOND, record.time[-1] / MICROSECOND)
-    axes.legend(loc="upper right", labelcolor="white")
+    axes.legend(
+        loc="upper right", frameon=True, facecolor="black", edgecolor="none", framealpha=0.5, labelcolor="white"
+    )
 
 
 def _arrival(detonator: Detonator, points: np.ndarray, speed: float) -> np.ndarray:
@@ -351,20 +343,30 @@ def _arrival(detonator: Detonator, points: np.ndarray, speed: float) -> np.ndarr
     return detonator.time + np.linalg.norm(offset, axis=1) / speed
 
 
-def _mark_theory(axes: Axes, scene: Scene, upper: float) -> None:
-    """A line at the Chapman-Jouguet pressure, if there is one below `upper` [Pa]."""
+def _draw_color_bar(figure: Figure, image: AxesImage, beside: Axes | np.ndarray, scene: Scene, shrink: float) -> None:
+    """The scale of the colours, with the Chapman-Jouguet pressure marked on it."""
+    bar = figure.colorbar(image, ax=beside, extend="max", shrink=shrink, aspect=28, pad=0.04)
+    bar.set_label("pressure [GPa]")
+    bar.ax.spines["outline"].set_linewidth(0.6)
+    for pressure in _cj_pressures(scene):
+        if pressure < bar.vmax:
+            bar.ax.axhline(pressure, color="white", linewidth=1.0)
+            label = {"xytext": (-3, 0), "textcoords": "offset points", "ha": "right", "va": "center", "fontsize": 8}
+            bar.ax.annotate("$p_{CJ}$", (0.0, pressure), xycoords=("axes fraction", "data"), **label)
+
+
+def _draw_theory(axes: Axes, scene: Scene) -> None:
+    """A line at the Chapman-Jouguet pressure of each explosive."""
+    for pressure in _cj_pressures(scene):
+        axes.axhline(pressure, color="0.5", linewidth=0.8, linestyle="--")
+        label = {"xytext": (3, 2), "textcoords": "offset points", "fontsize": 8}
+        axes.annotate("$p_{CJ}$", (0.0, pressure), xycoords=("axes fraction", "data"), **label)
+
+
+def _cj_pressures(scene: Scene) -> list[float]:
+    """The Chapman-Jouguet pressures of the scene's explosives [GPa], each once."""
     pressures = {charge.material.cj.pressure for charge in scene.charges if charge.material.cj is not None}
-    for pressure in pressures:
-        if pressure < upper:
-            axes.axhline(pressure / GIGAPASCAL, color="0.5", linewidth=0.8, linestyle="--")
-            axes.annotate(
-                "$p_{CJ}$",
-                (0.0, pressure / GIGAPASCAL),
-                xycoords=("axes fraction", "data"),
-                xytext=(3, 2),
-                textcoords="offset points",
-                fontsize=8,
-            )
+    return sorted(pressure / GIGAPASCAL for pressure in pressures)
 
 
 def _robust_maximum(pressures: Sequence[np.ndarray]) -> float:
