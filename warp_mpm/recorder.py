@@ -70,6 +70,7 @@ class Recorder:
         self._fetched: list[tuple[np.ndarray, np.ndarray]] = []
         self._first_step = 0
         self._pending = 0
+        self._peaks_taken = 0
 
     def record(self) -> None:
         """Record the state as it is now: once before the first step, then after each."""
@@ -79,10 +80,12 @@ class Recorder:
         wp.launch(record_step, 1 + self._regions + self._points, inputs=inputs, device=self._state.device)
         self._pending += 1
 
-    def peak_since_start(self) -> float:
-        """Highest field pressure recorded so far [Pa]."""
+    def take_peak(self) -> float:
+        """Highest field pressure of the steps recorded since this was last asked [Pa]."""
         self._fetch()
-        return max((float(rows[:, RECORD_FIELD_PRESSURE].max()) for _, rows in self._fetched), default=0.0)
+        peak = max(float(rows[:, RECORD_FIELD_PRESSURE].max()) for _, rows in self._fetched[self._peaks_taken :])
+        self._peaks_taken = len(self._fetched)
+        return peak
 
     def result(self) -> StepRecord:
         """Everything recorded so far."""

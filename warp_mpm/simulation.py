@@ -120,12 +120,8 @@ class _Run:
                 due = frames[next_frame]
                 now = self._advance(due)
                 next_frame = self._save_due(write, frames, next_frame, pictures, now)
-                peak = self.recorder_peak()
+                peak = self.history[-1]["peak_pressure_pa"]
                 self.progress.update(now, end, self.steps, f"peak {peak / 1e9:.2f} GPa")
-
-    def recorder_peak(self) -> float:
-        """Highest field pressure in the latest row of the history [Pa]."""
-        return self.history[-1]["peak_pressure_pa"]
 
     def finish(self, begin: float) -> Result:
         """Sum up, draw, and write the summary."""
@@ -206,7 +202,7 @@ class _Run:
         clock = self.state.clock_values()
         mean = float(pressure.mean()) if len(pressure) else 0.0
         spread = float(pressure.std()) / mean if mean > 0.0 else 0.0
-        return history_row(totals, self.steps, float(clock["dt"]), self.recorder.peak_since_start(), spread)
+        return history_row(totals, self.steps, float(clock["dt"]), self.recorder.take_peak(), spread)
 
     @contextmanager
     def _writers(self) -> Iterator[Any]:

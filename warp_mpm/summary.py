@@ -12,6 +12,7 @@ from warp_mpm.scene import Scene
 
 ARRIVAL_SHARE = 0.05  # of p_CJ: the front has arrived at a point when the field pressure there reaches it
 FITTED_PART = (0.1, 1.0)  # of the front path: what the burning start of the wave does is left out
+MEETING_PART = (0.25, 0.85)  # of the way from a detonator to a collision: start and collision zone are left out
 PLATEAU_PART = (0.5, 0.9)  # of the travel time: when the front pressure is taken
 
 
@@ -78,6 +79,41 @@ def front_speed(scene: Scene, record: StepRecord, material: Material) -> FrontSp
     return FrontSpeed(float(speed), residual, offset)
 
 
+def meeting_points(scene: Scene, record: StepRecord, material: Material) -> list[float | None]:
+    """Where on the line the fronts met, for each collision point: distance from the line's start [m].
+
+    Straight lines are fitted to the arrivals from either side; they cross where the fronts meet, far more exactly than
+    the cells resolve. None where a side has too few points.
+    """
+    if record.line is None or scene.line is None or material.cj is None:
+        return [None] * len(scene.collision_points)
+    start = np.array(scene.line.start)
+    along = (np.array(scene.line.end) - start) / scene.line.length
+    arrived = arrival_times(record.line, ARRIVAL_SHARE * material.cj.pressure)
+    sources = np.sort([(np.array(detonator.position) - start) @ along for detonator in scene.detonators])
+    met: list[float | None] = []
+    for point in scene.collision_points:
+        place = float((np.array(point) - start) @ along)
+        below, above = sources[sources < place], sources[sources > place]
+        if len(below) == 0 or len(above) == 0:
+            met.append(None)
+            continue
+        low = _arrival_fit(record.line.distance, arrived, below[-1], place)
+        high = _arrival_fit(record.line.distance, arrived, above[0], place)
+        met.append((high[1] - low[1]) / (low[0] - high[0]) if low and high else None)
+    return met
+
+
+def _arrival_fit(distance: np.ndarray, arrived: np.ndarray, source: float, end: float) -> tuple[float, float] | None:
+    """Slope [s/m] and intercept [s] of the arrivals between a source and the end of its way; None if too few."""
+    share = (distance - source) / (end - source)
+    used = np.isfinite(arrived) & (share > MEETING_PART[0]) & (share < MEETING_PART[1])
+    if used.sum() < 3:
+        return None
+    slope, intercept = np.polyfit(distance[used], arrived[used], 1)
+    return float(slope), float(intercept)
+
+
 def front_pressure(scene: Scene, record: StepRecord, material: Material) -> float | None:
     """Median over steps of the highest field pressure around the front path, late on its way [Pa]."""
     if record.path_pressure is None or material.burn is None or scene.front_path is None:
@@ -104,6 +140,7 @@ def figures_of_merit(scene: Scene, record: StepRecord) -> dict[str, object]:
         "front_offset_m": fit.offset if fit else None,
         "collision_pressure_pa": max(collisions) if collisions else None,
         "collision_pressures_pa": collisions,
+        "collision_positions_m": meeting_points(scene, record, material) if material is not None else [],
         "peak_pressure_pa": float(record.field_pressure.max()),
         "max_particle_pressure_pa": float(record.particle_pressure.max()),
     }

@@ -1,35 +1,33 @@
 """The pictures of a run: section pressure at chosen instants, pressure along a line over time, energies.
 
-Drawn with matplotlib's figure objects alone: no window, no global state, and matplotlib is loaded only when one is
-drawn. All pictures are in GPa, millimetres and microseconds.
+Drawn with matplotlib's figure objects alone: no window, no pyplot. All pictures are in GPa, millimetres and
+microseconds, in one style. matplotlib is an optional dependency, so import this module only to draw.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, Literal
 
 import numpy as np
+from matplotlib import colormaps, rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from warp_mpm.detonators import Detonator, PlaneDetonator
-from warp_mpm.errors import SimulationError
 from warp_mpm.output import colormap
 from warp_mpm.output.frame import LineRecord, SectionPicture
+from warp_mpm.output.whole_file import whole_file
 from warp_mpm.scene import Scene
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.image import AxesImage
+from warp_mpm.summary import ideal_arrival, lit_explosive
 
 GIGAPASCAL = 1e9  # [Pa]
 MILLIMETRE = 1e-3  # [m]
 MICROSECOND = 1e-6  # [s]
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
     "axes.titlesize": 9.0,
@@ -76,28 +74,9 @@ def section_figure(
         SimulationError: the file cannot be written.
     """
     lower, upper = pressure_range or (0.0, _robust_maximum([picture.pressure for picture in pictures]))
-    if min(scene.domain.cells[axis] for axis in scene.section.in_plane) < _THIN_CELLS:
-        with _style():
-            _save(_profiles(scene, pictures), path)
-        return
-    with _style():
-        window = _window(scene, pictures, faint=lower + _FAINT * (upper - lower))
-        rows, columns, size = _page(window, len(pictures))
-        figure = _new_figure(size)
-        panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-        for number, axes in enumerate(panels.flat):
-            if number >= len(pictures):
-                axes.set_visible(False)
-                continue
-            image = _draw_section(axes, scene, pictures[number], (lower, upper), window)
-            axes.set_title(f"({chr(ord('a') + number)})  {pictures[number].time / MICROSECOND:.1f} µs", pad=8.0)
-        first, second = (_AXIS_NAMES[axis] for axis in scene.section.in_plane)
-        for axes in panels[-1]:
-            axes.set_xlabel(f"{first} [mm]")
-        for axes in panels[:, 0]:
-            axes.set_ylabel(f"{second} [mm]")
-        _draw_color_bar(figure, image, panels, scene, shrink=0.8)
-        _save(figure, path)
+    thin = min(scene.domain.cells[axis] for axis in scene.section.in_plane) < _THIN_CELLS
+    with rc_context(STYLE):
+        _save(_profiles(scene, pictures) if thin else _panels(scene, pictures, (lower, upper)), path)
 
 
 def front_figure(
@@ -118,7 +97,7 @@ def front_figure(
     """
     lower, upper = pressure_range or (0.0, _robust_maximum([record.pressure]))
     distance = record.distance / MILLIMETRE
-    with _style():
+    with rc_context(STYLE):
         figure = _new_figure((5.6, 5.6))
         peak, axes = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.6))
         times, pressure = _even_times(record)
@@ -157,7 +136,7 @@ def energy_figure(path: str | Path, history: Sequence[Mapping[str, float]]) -> N
     kinetic, internal, released = (
         np.array([row[name] for row in history]) for name in ("kinetic_J", "internal_J", "released_J")
     )
-    with _style():
+    with rc_context(STYLE):
         figure = _new_figure((5.6, 3.4))
         axes = figure.subplots()
         curves = {"total": kinetic + internal, "internal": internal, "kinetic": kinetic, "released": released}
@@ -171,28 +150,35 @@ def energy_figure(path: str | Path, history: Sequence[Mapping[str, float]]) -> N
         _save(figure, path)
 
 
-def _style() -> AbstractContextManager[None]:
-    import matplotlib
-
-    return matplotlib.rc_context(STYLE)
-
-
 def _new_figure(size: tuple[float, float]) -> Figure:
-    from matplotlib.figure import Figure
-
     return Figure(figsize=size, layout="constrained")
 
 
 def _save(figure: Figure, path: str | Path) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    with whole_file(path) as part:
+        part.parent.mkdir(parents=True, exist_ok=True)
+        FigureCanvasAgg(figure).print_figure(str(part), format="png", bbox_inches="tight", pad_inches=0.05)
 
-    try:
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-        FigureCanvasAgg(figure).print_figure(str(path), format="png", bbox_inches="tight", pad_inches=0.05)
-    except OSError as error:
-        raise SimulationError(
-            f"cannot write {path}: {error.strerror or error}; free some space, or choose another output directory"
-        ) from error
+
+def _panels(scene: Scene, pictures: Sequence[SectionPicture], pressure_range: tuple[float, float]) -> Figure:
+    """One panel an instant, all of the same window and colours, with one colour bar."""
+    lower, upper = pressure_range
+    window = _window(scene, pictures, faint=lower + _FAINT * (upper - lower))
+    rows, columns, size = _page(window, len(pictures))
+    figure = _new_figure(size)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for number, (axes, picture) in enumerate(zip(panels.flat, pictures, strict=False)):
+        image = _draw_section(axes, scene, picture, pressure_range, window)
+        axes.set_title(f"({chr(ord('a') + number)})  {picture.time / MICROSECOND:.1f} µs", pad=8.0)
+    for axes in panels.flat[len(pictures) :]:
+        axes.set_visible(False)
+    first, second = (_AXIS_NAMES[axis] for axis in scene.section.in_plane)
+    for axes in panels[-1]:
+        axes.set_xlabel(f"{first} [mm]")
+    for axes in panels[:, 0]:
+        axes.set_ylabel(f"{second} [mm]")
+    _draw_color_bar(figure, image, panels, scene, shrink=0.8)
+    return figure
 
 
 def _draw_section(
@@ -285,8 +271,6 @@ def _page(window: tuple[float, float, float, float], count: int) -> tuple[int, i
 
 def _profiles(scene: Scene, pictures: Sequence[SectionPicture]) -> Figure:
     """Pressure along the longer axis of a section that is only a few cells across, one curve an instant."""
-    from matplotlib import colormaps
-
     first, second = scene.section.in_plane
     long_axis, thin = (first, 1) if scene.domain.cells[first] >= scene.domain.cells[second] else (second, 0)
     nodes = np.linspace(scene.domain.lower[long_axis], scene.domain.upper[long_axis], scene.domain.cells[long_axis] + 1)
@@ -317,15 +301,15 @@ def _even_times(record: LineRecord, rows: int = 1000) -> tuple[np.ndarray, np.nd
 
 
 def _draw_fronts(axes: Axes, scene: Scene, record: LineRecord) -> None:
-    """When the fronts should arrive, and where they should meet: t_i + |x - x_i| / D, the earliest of all detonators."""
-    speeds = {charge.material.burn.detonation_speed for charge in scene.charges if charge.material.burn is not None}
-    if len(speeds) != 1 or scene.line is None:
+    """When the first front should arrive, and so where fronts should meet: the least t_i + |x - x_i| / D."""
+    explosive = lit_explosive(scene)
+    if explosive is None or explosive.burn is None or scene.line is None:
         return
-    speed = speeds.pop()
+    speed = explosive.burn.detonation_speed
     along = np.linspace(record.distance[0], record.distance[-1], 1000)  # finer than the record: the corners stay sharp
     share = along[:, None] / scene.line.length
     points = (1.0 - share) * np.array(scene.line.start) + share * np.array(scene.line.end)
-    arrival = np.min([_arrival(detonator, points, speed) for detonator in scene.detonators], axis=0)
+    arrival = ideal_arrival(scene, points, speed)
     label = f"fronts at D = {speed:.0f} m/s"
     axes.plot(along / MILLIMETRE, arrival / MICROSECOND, color=MARK, linewidth=0.9, linestyle=(0, (6, 3)), label=label)
     axes.set_ylim(record.time[0] / MICROSECOND, record.time[-1] / MICROSECOND)
@@ -334,42 +318,39 @@ def _draw_fronts(axes: Axes, scene: Scene, record: LineRecord) -> None:
     )
 
 
-def _arrival(detonator: Detonator, points: np.ndarray, speed: float) -> np.ndarray:
-    """When a front from this detonator alone reaches each point [s]: (n,), for points (n, 3) [m] and its speed [m/s]."""
-    offset = points - np.array(detonator.position)
-    if isinstance(detonator, PlaneDetonator):
-        normal = np.array(detonator.normal)
-        return detonator.time + np.abs(offset @ normal) / np.linalg.norm(normal) / speed
-    return detonator.time + np.linalg.norm(offset, axis=1) / speed
-
-
 def _draw_color_bar(figure: Figure, image: AxesImage, beside: Axes | np.ndarray, scene: Scene, shrink: float) -> None:
     """The scale of the colours, with the Chapman-Jouguet pressure marked on it."""
-    bar = figure.colorbar(image, ax=beside, extend="max", shrink=shrink, aspect=28, pad=0.04)
+    bar = figure.colorbar(image, ax=beside, extend="max", shrink=shrink, aspect=28, pad=0.03)
     bar.set_label("pressure [GPa]")
     bar.ax.spines["outline"].set_linewidth(0.6)
-    for pressure in _cj_pressures(scene):
-        if pressure < bar.vmax:
-            bar.ax.axhline(pressure, color="white", linewidth=1.0)
-            label = {"xytext": (-3, 0), "textcoords": "offset points", "ha": "right", "va": "center", "fontsize": 8}
-            bar.ax.annotate("$p_{CJ}$", (0.0, pressure), xycoords=("axes fraction", "data"), **label)
+    pressure = _cj_pressure(scene)
+    if pressure is not None and pressure < bar.ax.get_ylim()[1]:
+        bar.ax.axhline(pressure, color="white", linewidth=1.0)
+        _label_cj(bar.ax, pressure, offset=(-3.0, -3.0), side="right")
 
 
 def _draw_theory(axes: Axes, scene: Scene) -> None:
-    """A line at the Chapman-Jouguet pressure of each explosive."""
-    for pressure in _cj_pressures(scene):
+    """A line at the Chapman-Jouguet pressure."""
+    pressure = _cj_pressure(scene)
+    if pressure is not None:
         axes.axhline(pressure, color="0.5", linewidth=0.8, linestyle="--")
-        label = {"xytext": (3, 2), "textcoords": "offset points", "fontsize": 8}
-        axes.annotate("$p_{CJ}$", (0.0, pressure), xycoords=("axes fraction", "data"), **label)
+        _label_cj(axes, pressure, offset=(3.0, 2.0), side="left")
 
 
-def _cj_pressures(scene: Scene) -> list[float]:
-    """The Chapman-Jouguet pressures of the scene's explosives [GPa], each once."""
-    pressures = {charge.material.cj.pressure for charge in scene.charges if charge.material.cj is not None}
-    return sorted(pressure / GIGAPASCAL for pressure in pressures)
+def _label_cj(axes: Axes, pressure: float, offset: tuple[float, float], side: Literal["left", "right"]) -> None:
+    """Write p_CJ at the left edge of the axes, at a height of `pressure` [GPa]; `offset` is in points."""
+    place = (0.0, pressure)
+    coordinates = ("axes fraction", "data")
+    axes.annotate("$p_{CJ}$", place, offset, coordinates, "offset points", horizontalalignment=side, fontsize=8.0)
+
+
+def _cj_pressure(scene: Scene) -> float | None:
+    """The Chapman-Jouguet pressure [GPa] of the explosive that the figures of the run refer to."""
+    explosive = lit_explosive(scene)
+    return explosive.cj.pressure / GIGAPASCAL if explosive is not None and explosive.cj is not None else None
 
 
 def _robust_maximum(pressures: Sequence[np.ndarray]) -> float:
-    """A pressure [Pa] that all but the highest 0.1 % stay below, rounded up to a tenth of a gigapascal."""
-    highest = max(float(np.quantile(pressure, 0.999)) for pressure in pressures)
+    """A pressure [Pa] that each array stays below but for its highest 1 %, rounded up to a tenth of a gigapascal."""
+    highest = max(float(np.quantile(pressure, 0.99)) for pressure in pressures)
     return math.ceil(max(highest, 1.0) / (0.1 * GIGAPASCAL)) * 0.1 * GIGAPASCAL

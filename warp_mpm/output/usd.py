@@ -2,10 +2,9 @@
 
 While the run goes on, every frame is a file of its own in `clips/`, and a small root layer `<name>.usda` plays them in
 turn (USD value clips). A file appears under its name only when it is whole, so a killed run keeps every frame it wrote,
-and memory does not grow with their number. `close` merges the frames into one `<name>.usdc` when they are not too large.
+and memory does not grow with their number. `close` merges the frames into one `<name>.usdc` if they are not too large.
 """
 
-import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,7 +14,6 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Sdf, Tf, Vt
 
-from warp_mpm.errors import SimulationError
 from warp_mpm.output import colormap
 from warp_mpm.output.frame import Frame
 from warp_mpm.output.usd_layout import (
@@ -28,6 +26,7 @@ from warp_mpm.output.usd_layout import (
     particle_widths,
     section_axes,
 )
+from warp_mpm.output.whole_file import whole_file, write_error
 from warp_mpm.scene import Scene
 
 MERGE_LIMIT = 1_000_000_000  # [bytes]; larger results stay in clips, because merging maps all frames at once
@@ -77,7 +76,7 @@ class UsdWriter:
             self._path.unlink(missing_ok=True)
             self._clips.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise _write_error(self._path, error.strerror or str(error)) from error
+            raise write_error(self._path, error) from error
         _export(self._static, self._clips / STATIC)
         _export(_manifest(self._types), self._clips / MANIFEST)
 
@@ -119,7 +118,7 @@ class UsdWriter:
         try:
             self._remove_working_files()
         except OSError as error:
-            raise _write_error(self._clips, error.strerror or str(error)) from error
+            raise write_error(self._clips, error) from error
         return self._path
 
     def _samples(self, frame: Frame) -> dict[str, Any]:
@@ -217,24 +216,15 @@ def _manifest(types: Mapping[str, Any]) -> Any:
 
 
 def _export(layer: Any, path: Path) -> None:
-    """Write the layer beside its place, then move it there: under its name it is always whole."""
-    part = path.with_suffix(f".part{path.suffix}")
-    try:
-        layer.Export(str(part))
-        os.replace(part, path)
-    except (OSError, Tf.ErrorException) as error:
-        part.unlink(missing_ok=True)
-        raise _write_error(path, _reason(error)) from error
-
-
-def _write_error(path: Path, reason: str) -> SimulationError:
-    return SimulationError(f"cannot write {path}: {reason}; free some space, or choose another output directory")
+    with whole_file(path) as part:
+        try:
+            layer.Export(str(part))
+        except Tf.ErrorException as error:
+            raise OSError(_reason(error)) from error
 
 
 def _reason(error: Exception) -> str:
-    """The first message of an error; USD wraps it in source file names and line numbers."""
-    if isinstance(error, OSError):
-        return error.strerror or str(error)
+    """The first message of an error of USD, which wraps it in source file names and line numbers."""
     message = re.search(r": '(.*?)'\s*$", str(error), re.MULTILINE)
     return message.group(1) if message else str(error).strip().splitlines()[0]
 

@@ -123,7 +123,7 @@ def _author_particles(stage: Any, scene: Scene, fields: Sequence[str], material:
 
 
 def _author_section(stage: Any, scene: Scene, material: Any) -> None:
-    """The nodes of the domain in the section plane and the quadrilaterals between them, node (i, j) at i nodes_v + j."""
+    """The nodes in the section plane and the quadrilaterals between them; node (i, j) is point i nodes_v + j."""
     u, v = section_axes(scene)
     plane = np.full((len(u), len(v), 3), scene.section.coordinate)
     first, second = scene.section.in_plane
@@ -196,7 +196,7 @@ def _author_material(stage: Any) -> Any:
 
 
 def _author_camera(stage: Any, scene: Scene) -> None:
-    """A camera that sees the whole charge, from the side of the section plane's normal and a little round the corner."""
+    """A camera that sees the whole charge, along the section plane's normal but a little round the corner."""
     lower, upper = _charge_box(scene)
     centre = 0.5 * (lower + upper)
     axes = _camera_axes(scene, turn=math.radians(25.0), lift=math.radians(12.0))
@@ -219,7 +219,7 @@ def _author_camera(stage: Any, scene: Scene) -> None:
 
 
 def _camera_axes(scene: Scene, turn: float, lift: float) -> np.ndarray:
-    """Right, up and backward of a camera that looks along the section's normal, turned aside and lifted [rad]: (3, 3)."""
+    """Right, up and backward (3, 3) of a camera that looks along the section's normal, turned and lifted [rad]."""
     right, up = np.eye(3)[list(scene.section.in_plane)]
     normal = np.cross(right, up)
     backward = math.cos(lift) * (math.cos(turn) * normal + math.sin(turn) * right) + math.sin(lift) * up

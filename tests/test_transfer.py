@@ -1,0 +1,411 @@
+"""Transfer between particles and grid conserves what it must, and reproduces linear and affine fields.
+
+Sources: Sulsky, Chen, Schreyer, A particle method for history-dependent materials, CMAME 118 (1994); Jiang et al., The
+affine particle-in-cell method, ACM Trans. Graph. 34 (2015), with proofs in Jiang, Schroeder, Teran, An angular
+momentum conserving affine-particle-in-cell method, J. Comput. Phys. 338 (2017).
+
+All sums here run over a few hundred particles and nodes in single precision, in an order of the machine's choice:
+`SUMMED` bounds their round-off relative to the sum of the absolute values.
+"""
+
+import functools
+
+import numpy as np
+import pytest
+import warp as wp
+from scenes_for_tests import CELL, OPEN, ROUND_OFF, block, inert_gas, nodes, particle_values, start
+
+from warp_mpm.config import Order, ShapeFunction, Transfer
+from warp_mpm.kernels import material, transfer, vectors
+from warp_mpm.kernels.motion import move_kernel
+from warp_mpm.kernels.precision import scalar, vector4, vector8
+from warp_mpm.kernels.records import Clock
+from warp_mpm.state import LAST_FRACTION
+
+SUMMED = 32 * ROUND_OFF
+DT = 1e-6  # [s]
+AFFINE_VELOCITY = np.array([30.0, -20.0, 50.0])  # a [m/s] of v = a + B x
+AFFINE_GRADIENT = np.array([[-300.0, 2000.0, 500.0], [1000.0, 700.0, -4000.0], [-1500.0, 900.0, 1200.0]])  # B [1/s]
+
+shapes = pytest.mark.parametrize("shape", list(ShapeFunction), ids=lambda shape: shape.value)
+
+
+def affine_field(position):
+    """V = a + B x (n, 3) at positions (n, 3)."""
+    return AFFINE_VELOCITY + position @ AFFINE_GRADIENT.T
+
+
+def scatter_particles(state):
+    """Random places within their cells, on cell boundaries too, and random masses, velocities and pressures."""
+    random = np.random.default_rng(2)
+    n = state.count
+    fraction = random.random((n, 3)).astype(np.float32)
+    fraction[: n // 8] = 0.0
+    fraction[n // 8 : n // 4] = LAST_FRACTION
+    particles = state.particles
+    particles.fraction.assign(fraction)
+    particles.velocity.assign(random.normal(0.0, 100.0, (n, 3)).astype(np.float32))
+    particles.mass.assign((particles.mass.numpy() * random.uniform(0.5, 2.0, n)).astype(np.float32))
+    particles.density.assign(random.uniform(500.0, 2000.0, n).astype(np.float32))
+    particles.viscous_pressure.assign(random.uniform(0.0, 1e8, n).astype(np.float32))
+
+
+def cloud(shape, device, *, prepare=scatter_particles, **config):
+    """A solver on a cloud of gas far from every face; its first scatter has been done and solved."""
+    scene = block((4, 3, 5), material=inert_gas(1000.0), walls=OPEN, margin_cells=3)
+    return start(scene, device, shape=shape, prepare=prepare, **config)
+
+
+def sums_on_the_nodes(solver, affine=False):
+    """Node sums (n, 8) and pressure sums (n,) of a scatter, in double, with their positions (n, 3)."""
+    state, model = solver.state, solver.model
+    state.grid.node.zero_()
+    state.grid.pressure.zero_()
+    kernel = transfer.scatter_kernel(model.shape, True, True, affine)
+    inputs = [state.particles, state.grid, model.charges[0].half_width, 0.0, 0]
+    wp.launch(kernel, state.count, inputs=inputs, device=state.device)
+    return nodes(solver).reshape(-1, 8).astype(np.float64), state.grid.pressure.numpy(), node_positions(solver)
+
+
+def node_positions(solver):
+    """Positions (n, 3) of all nodes [m], ghosts included."""
+    domain = solver.model.scene.domain
+    axes = [low + size * np.arange(-1, count + 2) for low, size, count in zip(*domain_parts(domain), strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def domain_parts(domain):
+    """Lower corner, spacing and cells."""
+    return domain.lower, domain.spacing, domain.cells
+
+
+def set_nodes(solver, velocity, acceleration=None):
+    """Give the nodes velocities and accelerations (n, 3); masses stay."""
+    values = solver.state.grid.node.numpy().copy()
+    values[:, 0:3] = velocity
+    values[:, 4:7] = 0.0 if acceleration is None else acceleration
+    solver.state.grid.node.assign(values)
+
+
+def set_time_step(state):
+    """Make the step DT long."""
+    clock = Clock()
+    clock.dt = DT
+    state.clock.assign([clock])
+
+
+def gather(solver, affine=False):
+    """Let the particles take the nodes' velocity over: PIC, or APIC with its gradient."""
+    state, model = solver.state, solver.model
+    set_time_step(state)
+    kernel = transfer.advance_kernel(model.shape, True, affine, False)
+    inputs = [state.particles, state.grid, state.clock, model.charges[0].half_width, 1.0, 0]
+    wp.launch(kernel, state.count, inputs=inputs, device=state.device)
+
+
+def assert_sums_agree(actual, expected, terms):
+    """Two vectors of sums agree to the round-off of the terms they are made of."""
+    scale = np.abs(terms).sum(axis=0).max()
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=SUMMED * scale)
+
+
+@shapes
+@pytest.mark.parametrize("affine", [False, True], ids=["flip", "apic"])
+def test_scatter_conserves_mass_momentum_and_volume(shape, affine, device):
+    """Sum over nodes of sum w m, w m v, w V = sum over particles: partition of unity; the affine part adds nothing."""
+    solver = cloud(shape, device, transfer=Transfer.APIC if affine else Transfer.FLIP)
+    if affine:
+        gradient = np.random.default_rng(3).normal(0.0, 1e4, (solver.state.count, 3, 3))
+        solver.state.particles.affine.assign(gradient.astype(np.float32))
+    values = particle_values(solver.state)
+    mass = values["mass"].astype(np.float64)
+    momentum = mass[:, None] * values["velocity"]
+    sums, _, _ = sums_on_the_nodes(solver, affine)
+    assert_sums_agree(sums[:, 3].sum(), mass.sum(), mass)
+    # The affine terms cancel in the sum, but each is as large as m |C| times a cell's diagonal.
+    carried = np.abs(momentum) + (mass[:, None] * 3 * 1e4 * CELL if affine else 0.0)
+    assert_sums_agree(sums[:, 0:3].sum(axis=0), momentum.sum(axis=0), carried)
+    assert_sums_agree(sums[:, 7].sum(), (mass / values["density"]).sum(), sums[:, 7])
+
+
+@shapes
+def test_internal_forces_balance(shape, device):
+    """Sum f = 0 and sum x cross f = 0; sum x . f = 3 sum (p + q) V; and the field's sum w V p = sum V p.
+
+    Gradients sum to zero and reproduce linear fields: sum x_i grad w_i is the unit matrix.
+    """
+    solver = cloud(shape, device)
+    values = particle_values(solver.state)
+    volume = values["mass"].astype(np.float64) / values["density"]
+    sums, pressure, place = sums_on_the_nodes(solver)
+    force = sums[:, 4:7]
+    assert np.abs(force).max() > 0.0
+    assert_sums_agree(force.sum(axis=0), np.zeros(3), force)
+    torque = np.cross(place, force)
+    assert_sums_agree(torque.sum(axis=0), np.zeros(3), torque)
+    pull = (values["pressure"].astype(np.float64) + values["viscous_pressure"]) * volume
+    virial = (place * force).sum(axis=1)
+    assert_sums_agree(virial.sum(), 3.0 * pull.sum(), virial)
+    energy = values["pressure"] * volume
+    assert_sums_agree(pressure.sum(dtype=np.float64), energy.sum(), energy)
+
+
+@shapes
+def test_gather_reproduces_an_affine_field(shape, device):
+    """PIC from v_i = a + B x_i gives v_p = a + B x_p, APIC the gradient B too: linear reproduction (Jiang 2015)."""
+    solver = cloud(shape, device, transfer=Transfer.APIC)
+    set_nodes(solver, affine_field(node_positions(solver)))
+    gather(solver, affine=True)
+    values = particle_values(solver.state)
+    expected = affine_field(values["position"])
+    fastest = np.abs(affine_field(node_positions(solver))).max()
+    np.testing.assert_allclose(values["velocity"], expected, rtol=0, atol=SUMMED * fastest)
+    gradient = solver.state.field("affine")
+    # Gradients are differences of nodal velocities over a cell.
+    np.testing.assert_allclose(gradient, np.broadcast_to(AFFINE_GRADIENT, gradient.shape), atol=SUMMED * fastest / CELL)
+
+
+@shapes
+def test_particles_move_with_the_grid(shape, device):
+    """x_p += dt sum w (v + dt a)_i (paper eq. 15), exact for affine fields of v and a; through cell boundaries too."""
+    solver = cloud(shape, device, order=Order.USF, transfer=Transfer.FLIP)
+    state, model = solver.state, solver.model
+    place = node_positions(solver)
+    stretch = 40.0  # the fastest nodes move by more than half a cell
+    set_nodes(solver, stretch * affine_field(place), stretch / DT * affine_field(place))
+    set_time_step(state)
+    before = particle_values(state)
+    inputs = [state.particles, state.grid, model.faces, state.clock, model.charges[0].half_width]
+    inputs += [state.maxima, state.tallies, state.faults, 0, 0]
+    wp.launch(move_kernel(model.shape), state.count, inputs=inputs, device=state.device)
+    after = particle_values(state)
+    expected = 2.0 * stretch * DT * affine_field(before["position"])
+    fastest = 2.0 * stretch * DT * np.abs(affine_field(place)).max()
+    # A position is a fraction of its cell, which it resolves to a rounding.
+    moved = after["position"] - before["position"]
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=SUMMED * fastest + 2 * ROUND_OFF * CELL)
+    assert np.any(after["cell"] != before["cell"])
+    assert not state.faults.numpy().any()
+    assert after["fraction"].min() >= 0.0
+    assert after["fraction"].max() < 1.0
+
+
+@functools.cache
+def strain_kernel(shape, strain, damped):
+    """Kernel that gathers the strain increments of all particles into rows."""
+    gather_strain = material.strain_function(shape, strain, damped)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def evaluate(
+        particles: material.Particles,
+        grid: material.Grid,
+        half_width: scalar,
+        dt: scalar,
+        rows: wp.array2d(dtype=scalar),
+    ):
+        p = wp.tid()
+        s = gather_strain(grid, particles.cell[p], particles.fraction[p], particles.velocity[p], half_width, dt)
+        for axis in range(3):
+            rows[p, axis] = s.motion[axis]
+            rows[p, 3 + axis] = s.slip[axis]
+        rows[p, 6] = s.divergence
+        rows[p, 7] = s.work_divergence
+        rows[p, 8] = s.slip_squared
+        rows[p, 9] = s.heat
+        rows[p, 10] = s.filling
+
+    return evaluate
+
+
+def strains(solver, strain, damped):
+    """Rows of the strain increments (n, 11) in creation order, in double."""
+    state, model = solver.state, solver.model
+    rows = wp.zeros((state.count, 11), dtype=scalar, device=state.device)
+    inputs = [state.particles, state.grid, model.charges[0].half_width, DT, rows]
+    wp.launch(strain_kernel(model.shape, strain, damped), state.count, inputs=inputs, device=state.device)
+    return state.in_creation_order(rows.numpy().astype(np.float64))
+
+
+@shapes
+def test_strain_of_affine_fields(shape, device):
+    """Div of v^n = a + B x and of re-projected v_r = 3 v^n is tr B and 3 tr B; the work takes their mean.
+
+    With the damping: u = sum w (v_r - v_p), sum w |v_r - v_p|^2 >= |u|^2 (Jensen), heat and filling are sums w H.
+    """
+    solver = cloud(shape, device)
+    place = node_positions(solver)
+    velocity = affine_field(place)
+    acceleration = velocity / DT
+    set_nodes(solver, velocity, acceleration)
+    nodal = solver.state.grid.node.numpy().copy()
+    nodal[:, 7] = 0.75
+    solver.state.grid.node.assign(nodal)
+    reprojected = np.concatenate([3.0 * velocity, np.full((len(velocity), 1), 7.0)], axis=1)
+    solver.state.grid.reprojected.assign(reprojected.astype(np.float32))
+    values = particle_values(solver.state)
+    here = affine_field(values["position"])
+    trace = np.trace(AFFINE_GRADIENT)
+    fastest = np.abs(3.0 * velocity).max()
+    slope_round_off = SUMMED * fastest / CELL
+
+    rows = strains(solver, material.Strain.REPROJECTED, True)
+    np.testing.assert_allclose(rows[:, 0:3], 2.0 * here, rtol=0, atol=SUMMED * fastest)
+    np.testing.assert_allclose(rows[:, 6], 3.0 * trace, rtol=0, atol=slope_round_off)
+    np.testing.assert_allclose(rows[:, 7], 2.0 * trace, rtol=0, atol=slope_round_off)
+    slip = 3.0 * here - values["velocity"]
+    np.testing.assert_allclose(rows[:, 3:6], slip, rtol=0, atol=SUMMED * fastest)
+    squared = (slip**2).sum(axis=1)
+    assert np.all(rows[:, 8] >= squared - SUMMED * fastest**2)
+    assert np.any(rows[:, 8] > squared + (3.0 * np.abs(AFFINE_GRADIENT).max() * 0.1 * CELL) ** 2)
+    np.testing.assert_allclose(rows[:, 9], 7.0, rtol=SUMMED)
+    np.testing.assert_allclose(rows[:, 10], 0.75, rtol=SUMMED)
+
+    start_rows = strains(solver, material.Strain.START, False)
+    np.testing.assert_allclose(start_rows[:, 6:8], trace, rtol=0, atol=slope_round_off)
+    end_rows = strains(solver, material.Strain.END, False)
+    np.testing.assert_allclose(end_rows[:, 6], 2.0 * trace, rtol=0, atol=slope_round_off)
+    np.testing.assert_allclose(end_rows[:, 7], 1.5 * trace, rtol=0, atol=slope_round_off)
+
+
+@shapes
+def test_apic_keeps_an_affine_field_over_a_round_trip(shape, device):
+    """Particles with v = a + B x and C = B -> grid -> particles: both are unchanged (Jiang et al. 2015, prop. 1).
+
+    Particles keep a thousandth of a cell away from cell boundaries: there the linear shape takes the gradient from
+    nodes that may have no mass.
+    """
+
+    def prepare(state):
+        scatter_particles(state)
+        state.particles.fraction.assign(np.clip(state.particles.fraction.numpy(), 1e-3, 0.999))
+        position = particle_values(state)["position"][state.particles.index.numpy()]
+        state.particles.velocity.assign(affine_field(position).astype(np.float32))
+        state.particles.affine.assign(np.broadcast_to(AFFINE_GRADIENT, (state.count, 3, 3)).astype(np.float32))
+
+    solver = cloud(shape, device, prepare=prepare, transfer=Transfer.APIC)
+    set_nodes(solver, nodes(solver).reshape(-1, 8)[:, 0:3])  # as scattered and solved, without the forces
+    gather(solver, affine=True)
+    values = particle_values(solver.state)
+    fastest = np.abs(affine_field(node_positions(solver))).max()
+    expected = affine_field(values["position"])
+    np.testing.assert_allclose(values["velocity"], expected, rtol=0, atol=SUMMED * fastest)
+    gradient = solver.state.field("affine")
+    np.testing.assert_allclose(gradient, np.broadcast_to(AFFINE_GRADIENT, gradient.shape), atol=SUMMED * fastest / CELL)
+
+
+def angular_momentum(solver, velocity, gradient):
+    """Sum over particles of x cross m v + m sum w d cross C d with d = x_i - x_p (Jiang et al. 2017, eq. 16) and sizes.
+
+    Sum w d d^T is diagonal, as the stencil is a product and sum w d = 0 along every axis.
+    """
+    values = particle_values(solver.state)
+    mass = values["mass"].astype(np.float64)[:, None]
+    moments = second_moments(solver)
+    spin = np.stack(
+        [
+            gradient[:, 2, 1] * moments[:, 1] - gradient[:, 1, 2] * moments[:, 2],
+            gradient[:, 0, 2] * moments[:, 2] - gradient[:, 2, 0] * moments[:, 0],
+            gradient[:, 1, 0] * moments[:, 0] - gradient[:, 0, 1] * moments[:, 1],
+        ],
+        axis=1,
+    )
+    terms = mass * (np.cross(values["position"], velocity) + spin)
+    return terms.sum(axis=0), np.abs(terms).sum()
+
+
+@functools.cache
+def moment_kernel(shape):
+    """Kernel of the second moments sum w s^2 along each axis, in cells^2."""
+    _, weights, _, _ = transfer.stencil_functions(shape)
+    width, offset = shape.width, shape.offset
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def evaluate(particles: material.Particles, half_width: scalar, rows: wp.array2d(dtype=scalar)):
+        p = wp.tid()
+        for axis in range(3):
+            fraction = particles.fraction[p][axis]
+            w = weights(fraction, half_width)
+            moment = scalar(0.0)
+            for n in range(width):
+                distance = fraction - scalar(offset(fraction)) - scalar(n)
+                moment += w[n] * distance * distance
+            rows[p, axis] = moment
+
+    return evaluate
+
+
+def second_moments(solver):
+    """Sum w (x_i - x_p)^2 along each axis (n, 3) [m2], in creation order."""
+    state, model = solver.state, solver.model
+    rows = wp.zeros((state.count, 3), dtype=scalar, device=state.device)
+    inputs = [state.particles, model.charges[0].half_width, rows]
+    wp.launch(moment_kernel(model.shape), state.count, inputs=inputs, device=state.device)
+    return state.in_creation_order(rows.numpy().astype(np.float64)) * CELL**2
+
+
+@shapes
+def test_apic_conserves_angular_momentum_both_ways(shape, device):
+    """L = sum x_i cross m_i v_i on the grid = L of the particles with their affine part (Jiang et al. 2017)."""
+
+    def prepare(state):
+        scatter_particles(state)
+        gradient = np.random.default_rng(4).normal(0.0, 1e4, (state.count, 3, 3))
+        state.particles.affine.assign(gradient.astype(np.float32))
+
+    solver = cloud(shape, device, prepare=prepare, transfer=Transfer.APIC)
+    values = particle_values(solver.state)
+    before, size = angular_momentum(solver, values["velocity"], solver.state.field("affine").astype(np.float64))
+    sums, _, place = sums_on_the_nodes(solver, affine=True)
+    on_nodes = np.cross(place, sums[:, 0:3]).sum(axis=0)
+    np.testing.assert_allclose(on_nodes, before, rtol=0, atol=SUMMED * size)
+
+    mass = sums[:, 3]
+    velocity = np.random.default_rng(5).normal(0.0, 100.0, (len(mass), 3)).astype(np.float32).astype(np.float64)
+    on_nodes = np.cross(place, mass[:, None] * velocity).sum(axis=0)
+    set_nodes(solver, velocity)
+    gather(solver, affine=True)
+    after = particle_values(solver.state)["velocity"]
+    affine = solver.state.field("affine").astype(np.float64)
+    on_particles, size = angular_momentum(solver, after, affine)
+    # A gradient is w v / h over the second moment, and those of the linear shape vanish towards a node.
+    np.testing.assert_allclose(on_particles, on_nodes, rtol=0, atol=SUMMED * size)
+
+
+@functools.cache
+def vector_kernel(lanes):
+    """Kernel that applies the multiply-add and the scatter of `vectors.py` to rows."""
+    vector = vector4 if lanes == 4 else vector8
+    multiply_add = vectors.multiply_add4 if lanes == 4 else vectors.multiply_add8
+    scatter_add = vectors.scatter_add4 if lanes == 4 else vectors.scatter_add8
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def evaluate(
+        totals: wp.array(dtype=vector),
+        weights: wp.array(dtype=scalar),
+        values: wp.array(dtype=vector),
+        results: wp.array(dtype=vector),
+        nodes: wp.array(dtype=vector),
+    ):
+        n = wp.tid()
+        results[n] = multiply_add(totals[n], weights[n], values[n])
+        scatter_add(nodes, n, weights[n], values[n])
+
+    return evaluate
+
+
+@pytest.mark.parametrize("lanes", [4, 8])
+def test_vector_operations_equal_numpy(lanes, device):
+    """Total + weight value, in every lane; a fused multiply-add saves one of the two roundings."""
+    vector = vector4 if lanes == 4 else vector8
+    random = np.random.default_rng(6)
+    totals, values = random.normal(0.0, 1e3, (2, 100, lanes)).astype(np.float32)
+    weights = random.normal(0.0, 1.0, 100).astype(np.float32)
+    results = wp.zeros(100, dtype=vector, device=device)
+    target = wp.array(totals, dtype=vector, device=device)
+    given = [wp.array(totals, dtype=vector, device=device), wp.array(weights, device=device)]
+    inputs = [*given, wp.array(values, dtype=vector, device=device), results, target]
+    wp.launch(vector_kernel(lanes), 100, inputs=inputs, device=device)
+    product = weights[:, None].astype(np.float64) * values
+    rounding = 2 * ROUND_OFF * (np.abs(totals) + np.abs(product))
+    for computed in (results.numpy(), target.numpy()):
+        assert np.all(np.abs(computed - (totals + product)) <= rounding)

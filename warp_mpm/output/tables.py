@@ -1,0 +1,183 @@
+"""The numbers of a run: history.csv row by row, summary.json, and the table that a person reads at the end."""
+
+import csv
+import json
+import math
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from warp_mpm.output.whole_file import whole_file, write_error
+
+COLLISION_RATIO = 2.443  # pressure at the contact of two plane CJ fronts, head-on, over p_CJ, for gamma = 2
+GIGAPASCAL = 1e9  # [Pa]
+MICROSECOND = 1e-6  # [s]
+DASH = "–"
+
+
+class HistoryWriter:
+    """history.csv in the making; each row is on disk when `write` returns."""
+
+    def __init__(self, path: str | Path, columns: Sequence[str]) -> None:
+        """Start the file with its header.
+
+        Raises:
+            SimulationError: the file system refuses.
+        """
+        self._path = Path(path)
+        self._columns = tuple(columns)
+        try:
+            self._file = self._path.open("w", newline="", encoding="utf-8")
+        except OSError as error:
+            raise write_error(self._path, error) from error
+        self._rows = csv.writer(self._file, lineterminator="\n")
+        self._append(self._columns)
+
+    def __enter__(self) -> "HistoryWriter":
+        """The writer itself."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        """Close the file."""
+        self.close()
+
+    def write(self, row: Mapping[str, Any]) -> None:
+        """Add a row; numbers are written so that they read back exactly, what is not a finite number stays empty.
+
+        Raises:
+            KeyError: a column is missing.
+            SimulationError: the disk is full or refuses.
+        """
+        values = [_plain(row[name]) for name in self._columns]
+        self._append(["" if value is None else value for value in values])
+
+    def close(self) -> None:
+        """Close the file. May be called twice."""
+        self._file.close()
+
+    def _append(self, values: Sequence[Any]) -> None:
+        try:
+            self._rows.writerow(values)
+            self._file.flush()
+        except OSError as error:
+            raise write_error(self._path, error) from error
+
+
+def write_summary(path: str | Path, summary: Mapping[str, Any]) -> None:
+    """Write summary.json; under its name it is always whole. What is not a finite number becomes null.
+
+    Raises:
+        SimulationError: the disk is full or refuses.
+    """
+    text = json.dumps(_plain(summary), indent=2, ensure_ascii=False, allow_nan=False)
+    with whole_file(path) as part:
+        part.write_text(f"{text}\n", encoding="utf-8")
+
+
+def print_summary(summary: Mapping[str, Any], console: Console | None = None) -> None:
+    """Print the figures of a run beside theory, its errors, what it cost, and its warnings.
+
+    Args:
+        summary: as in summary.json; what is missing or null shows as a dash.
+        console: where to; standard output if not given.
+    """
+    console = console or Console()
+    console.print(theory_table(summary))
+    console.print(_errors(summary), highlight=False, markup=False, soft_wrap=True)
+    console.print(_cost(summary), highlight=False, markup=False, soft_wrap=True)
+    for warning in summary.get("warnings") or ():
+        console.print(f"warning: {warning}", style="yellow", highlight=False, markup=False, soft_wrap=True)
+
+
+def theory_table(summary: Mapping[str, Any]) -> Table:
+    """The front and the collision as computed, and as Chapman-Jouguet theory has them."""
+    cj_pressure, cj_speed = summary.get("p_cj_pa"), summary.get("detonation_speed_m_s")
+    front, collision = summary.get("front_pressure_pa"), summary.get("collision_pressure_pa")
+    contact = None if cj_pressure is None or collision is None else COLLISION_RATIO * cj_pressure
+    rows = [
+        ("front pressure", front, cj_pressure, "p_CJ", _pressure),
+        ("front speed", summary.get("front_speed_m_s"), cj_speed, "D", _speed),
+        ("collision pressure", collision, contact, f"{COLLISION_RATIO} p_CJ *", _pressure),
+        ("collision / front", _ratio(collision, front), COLLISION_RATIO if contact else None, "*", _number),
+        ("peak pressure", summary.get("peak_pressure_pa"), None, "", _pressure),
+        ("peak at a particle", summary.get("max_particle_pressure_pa"), None, "", _pressure),
+    ]
+    table = Table(title=str(summary.get("scene", "run")), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD)
+    table.add_column("")
+    for heading in ("run", "theory"):
+        table.add_column(heading, justify="right")
+    table.add_column("")
+    table.add_column("run / theory", justify="right")
+    for name, value, theory, symbol, shown in rows:
+        known = theory is not None
+        table.add_row(name, shown(value), shown(theory), symbol if known else "", _number(_ratio(value, theory)))
+    if contact is not None:
+        table.caption, table.caption_justify = "* plane fronts at the instant of contact, gamma = 2", "left"
+    return table
+
+
+def _errors(summary: Mapping[str, Any]) -> str:
+    """One line with the relative errors of the conserved quantities."""
+    errors = (f"{name} {_error(summary.get(f'{name}_error'))}" for name in ("mass", "momentum", "energy"))
+    return f"errors: {', '.join(errors)}"
+
+
+def _cost(summary: Mapping[str, Any]) -> str:
+    """What was computed, how long it took, and on what."""
+    end = summary.get("end_time_s")
+    time = DASH if end is None else f"{end / MICROSECOND:.1f} µs"
+    size = f"{_count(summary.get('particles'))} particles, {_count(summary.get('steps'))} steps to {time}"
+    wall, speed = summary.get("wall_s"), summary.get("ns_per_particle_step")
+    seconds = DASH if wall is None else f"{wall:.1f} s"
+    each = DASH if speed is None else f"{speed:.1f} ns"
+    return f"{size} in {seconds} on {summary.get('device', DASH)}, {each} per particle-step"
+
+
+def _pressure(value: float | None) -> str:
+    return DASH if value is None else f"{value / GIGAPASCAL:.3f} GPa"
+
+
+def _speed(value: float | None) -> str:
+    return DASH if value is None else f"{value:.1f} m/s"
+
+
+def _number(value: float | None) -> str:
+    return DASH if value is None else f"{value:.3f}"
+
+
+def _error(value: float | None) -> str:
+    return DASH if value is None else f"{value:.1e}"
+
+
+def _count(value: int | None) -> str:
+    return DASH if value is None else f"{value:,}"
+
+
+def _ratio(value: float | None, other: float | None) -> float | None:
+    return None if value is None or not other else value / other
+
+
+def _plain(value: Any) -> Any:
+    """The value as JSON and CSV know it; None for a number that is not finite."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Enum):
+        return _plain(value.value)
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return str(value)
