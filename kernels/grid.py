@@ -37,14 +37,24 @@ def active_node(grid: Grid, index: int) -> wp.vec3i:
     )
 
 
+@wp.func
+def is_empty(node: vector8) -> bool:
+    """Whether nothing was scattered to a node: no mass, and no force either, which may come without mass.
+
+    Most active nodes are empty once gas flies apart; reading them is cheap, writing is not.
+    """
+    return node[3] == ZERO and node[4] == ZERO and node[5] == ZERO and node[6] == ZERO
+
+
 @wp.kernel(enable_backward=False)
 def clear(grid: Grid, begin: int):
     """Empty the active nodes."""
     node = active_node(grid, begin + wp.tid())
     n = node_index(grid, node[0], node[1], node[2])
-    grid.node[n] = vector8()
-    grid.pressure[n] = ZERO
-    grid.reprojected[n] = vector4()
+    if not is_empty(grid.node[n]):
+        grid.node[n] = vector8()
+        grid.pressure[n] = ZERO
+        grid.reprojected[n] = vector4()
 
 
 @wp.func
@@ -103,12 +113,16 @@ def tally_walls(
     index: wp.vec3i,
     owned: wp.vec3i,
     force: bool,
+    total_mass: scalar,
     share: scalar,
     value: vector3,
     reactions: wp.array(dtype=wp.float64),
     slot: int,
 ):
-    """Tally what walls add to a node and its ghosts: of the forces, or of a share of the momenta."""
+    """Tally what walls add to a node and its ghosts: of the forces, or of a share of the momenta.
+
+    `total_mass` is that of the node and its ghosts, whose whole weight counts at the node.
+    """
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
@@ -119,7 +133,8 @@ def tally_walls(
                 body = vector3()
                 if force:
                     scattered = second_three(x)
-                    body = mass * boundary.gravity
+                    if i + j + k == 0:
+                        body = total_mass * boundary.gravity
                 tally_reaction(
                     boundary, grid, index, sides, share * scattered, body, share * mass * value, reactions, slot
                 )
@@ -179,8 +194,10 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
         total = own
         energy = grid.pressure[n]
         owned = ghost_sides(boundary, grid.cells, index)
-        free = free_components(boundary, grid.cells, index)
         ghosts = owned[0] + owned[1] + owned[2] > 0
+        if is_empty(own) and not ghosts:
+            return
+        free = free_components(boundary, grid.cells, index)
         if ghosts:
             total = fold(grid, boundary, index, owned)
             energy = fold_pressure(grid, index, owned)
@@ -205,9 +222,9 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
                 pressure = energy / (node_volume(grid, index) * filling)
         if ghosts or free[0] * free[1] * free[2] == ZERO:
             if wp.static(force):
-                tally_walls(grid, boundary, index, owned, True, ONE, acceleration, reactions, slot)
+                tally_walls(grid, boundary, index, owned, True, mass, ONE, acceleration, reactions, slot)
             if wp.static(momentum) and pic_share > ZERO:
-                tally_walls(grid, boundary, index, owned, False, pic_share, velocity, impulses, slot)
+                tally_walls(grid, boundary, index, owned, False, mass, pic_share, velocity, impulses, slot)
             mirror(grid, boundary, index, owned, velocity, acceleration, filling, pressure)
         grid.node[n] = vector8(
             velocity[0], velocity[1], velocity[2], mass, acceleration[0], acceleration[1], acceleration[2], filling
@@ -247,6 +264,8 @@ def solve_reprojected(
     n = node_index(grid, index[0], index[1], index[2])
     alpha = clock[0].damping
     mass = grid.node[n][3]
+    if mass == ZERO:
+        return
     owned = ghost_sides(boundary, grid.cells, index)
     free = free_components(boundary, grid.cells, index)
     total = grid.reprojected[n]

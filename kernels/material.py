@@ -34,6 +34,10 @@ from warp_mpm.kernels.viscosity import Viscosity, viscous_pressure, viscous_rate
 
 RELAXATION = wp.constant(scalar(0.1))  # of the density towards full nodes, per cell that sound crosses
 FILLED = wp.constant(scalar(0.95))  # nodes fuller than this relax fully
+# Where a wave arrives, whether a particle burns already is a matter of round-off: what a switch would turn into a jump
+# sets in over a short part of the burn instead, so that mirror images stay mirror images.
+IGNITED = wp.constant(scalar(0.1))  # burn fraction from which on the viscosity acts fully
+BURNT_OUT = wp.constant(scalar(0.9))  # the relaxation sets in over the last tenth of the burn
 SPARSE = wp.constant(scalar(0.80))  # nodes emptier than this, at a free surface, not at all
 
 
@@ -176,8 +180,8 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
         result.burn_fraction = burnt
         result.pressure = burnt * products
         result.sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
-        if burnt > ZERO:
-            result.viscous_pressure = viscous_pressure(viscosity, density, result.sound_speed, divergence)
+        onset = wp.min(burnt / IGNITED, ONE)
+        result.viscous_pressure = onset * viscous_pressure(viscosity, density, result.sound_speed, divergence)
         return result
 
     return respond
@@ -317,9 +321,10 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         burnt = ONE
         if wp.static(burns):
             burnt = particles.burn_fraction[p]
-        if wp.static(damped) and burnt >= ONE:
+        if wp.static(damped) and burnt > BURNT_OUT:
             sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
-            density = relax_density(density, strained.filling, dt * sound_speed / viscosity.length)
+            onset = (burnt - BURNT_OUT) / (ONE - BURNT_OUT)
+            density = relax_density(density, strained.filling, onset * dt * sound_speed / viscosity.length)
 
         moved = ZERO
         if wp.static(move):

@@ -1,5 +1,6 @@
 """The order of particles in memory: by slab, charge and cell, so that neighbours on the grid are neighbours there."""
 
+import functools
 from typing import Any
 
 import warp as wp
@@ -54,11 +55,16 @@ def group_starts(keys: wp.array(dtype=wp.int64), count: int, cells: wp.int64, st
         starts[g] = p
 
 
-@wp.kernel(enable_backward=False)
-def permute(source: wp.array(dtype=Any), order: wp.array(dtype=int), target: wp.array(dtype=Any)):
-    """target[p] = source[order[p]]."""
-    p = wp.tid()
-    target[p] = source[order[p]]
+@functools.cache
+def permute_kernel(dtype: Any) -> wp.Kernel:
+    """target[p] = source[order[p]], for arrays of one type."""
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def permute(source: wp.array(dtype=dtype), order: wp.array(dtype=int), target: wp.array(dtype=dtype)):
+        p = wp.tid()
+        target[p] = source[order[p]]
+
+    return permute
 
 
 @wp.kernel(enable_backward=False)

@@ -21,7 +21,7 @@ from warp_mpm.kernels.walls import Boundary, is_owner
 
 GROWTH = wp.constant(scalar(1.1))  # of the time step, from one step to the next, at most
 LARGEST_STRAIN = wp.constant(scalar(0.2))  # |div v| dt, at most
-DAMPING = wp.constant(scalar(0.2))  # k of the conservative damping
+DAMPING = 0.2  # k of the conservative damping
 TINY = wp.constant(scalar(1.0e-30))  # keeps a rate that is zero from being divided by
 
 # Lanes of the audit, one row for each slab.
@@ -51,13 +51,15 @@ def start_step(
     spacing: vector3,
     length: scalar,
     cfl: scalar,
+    damping: scalar,
     slabs: int,
     maxima: wp.array(dtype=Maxima),
 ):
     """Choose the time step, advance the time to its end, set the damping, and empty the maxima.
 
     dt = cfl / max over axes of max(c + |v_axis|, D) / h_axis; cfl l^2 / nu for the viscosity; |div v| dt <= 0.2;
-    at most 1.1 times the last; clipped to the end time. alpha = k s / (1 + k s), s = dt max(c + |v|) / h.
+    at most 1.1 times the last; clipped to the end time. alpha = k s / (1 + k s), s = dt max(c + |v|) / h, for the
+    damping k; 0 without it, as walls act on what it moves.
     """
     now = clock[0]
     burn_speed = largest(maxima, slabs, BURN_SPEED)
@@ -78,7 +80,7 @@ def start_step(
         now.smallest_dt = dt
     if not clipped:
         now.smallest_dt = wp.min(now.smallest_dt, dt)
-    crossing = DAMPING * dt * largest(maxima, slabs, SIGNAL_SPEED) / length
+    crossing = damping * dt * largest(maxima, slabs, SIGNAL_SPEED) / length
     now.damping = crossing / (ONE + crossing)
     now.dt = dt
     now.step = now.step + 1

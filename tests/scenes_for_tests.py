@@ -1,14 +1,17 @@
 """Small scenes, and a solver on them without the run loop around it."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import pytest
 
 from warp_mpm.builder import SceneBuilder
-from warp_mpm.config import SolverConfig
+from warp_mpm.config import Order, SolverConfig, Transfer
 from warp_mpm.conservation import Audit, totals_of
 from warp_mpm.detonators import Detonator, PointDetonator
+from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.launch import Launcher, find_device
@@ -23,6 +26,22 @@ ROUND_OFF = 2.0**-24  # of a number in single precision, relative
 OPEN = Walls.all(Wall.OPEN)
 STICK = Walls.all(Wall.STICK)
 CORNER = PointDetonator((0.0, 0.0, 0.0))
+
+
+def _is_allowed(order: Order, transfer: Transfer) -> bool:
+    try:
+        SolverConfig(order=order, transfer=transfer)
+    except InputError:
+        return False
+    return True
+
+
+# Every order and transfer that may go together, as parameters of a test.
+ORDERS_AND_TRANSFERS = [
+    pytest.param(order, transfer, id=f"{order.value}-{transfer.value}")
+    for order, transfer in itertools.product(Order, Transfer)
+    if _is_allowed(order, transfer)
+]
 
 
 def explosive() -> Material:
@@ -90,10 +109,11 @@ def advance(solver: Solver, steps: int) -> Solver:
     return solver
 
 
-def audited(solver: Solver, steps: int, every: int = 5) -> Audit:
-    """Take some steps, with an audit of the conserved sums before and after every few."""
-    audit = Audit(np.array(solver.model.scene.gravity), solver.model.scene.mass)
-    audit.add(totals_of(solver))
+def audited(solver: Solver, steps: int, every: int = 5, audit: Audit | None = None) -> Audit:
+    """Take some steps, with an audit of the conserved sums after every few; it begins before them, or goes on."""
+    if audit is None:
+        audit = Audit(np.array(solver.model.scene.gravity), solver.model.scene.mass)
+        audit.add(totals_of(solver))
     for _ in range(steps // every):
         advance(solver, every)
         audit.add(totals_of(solver))

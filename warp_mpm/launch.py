@@ -29,7 +29,7 @@ class Launcher:
     """
 
     def __init__(self, device: wp.Device, threads: int | None = None) -> None:
-        available = os.cpu_count() or 1
+        available = available_cores()
         if threads is not None and threads < 1:
             raise InputError(f"threads: expected at least 1, got {threads}; leave it out for all {available} cores")
         self.device = device
@@ -53,6 +53,13 @@ class Launcher:
         """End the threads."""
         if self._pool is not None:
             self._pool.shutdown()
+
+
+def available_cores() -> int:
+    """Cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def find_device(name: str | None) -> wp.Device:

@@ -1,7 +1,6 @@
 """The run: steps a scene to its end, saves what was asked for, audits itself, and sums up."""
 
 import math
-import os
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -14,7 +13,8 @@ import numpy as np
 
 from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, totals_of
-from warp_mpm.errors import InputError, SimulationError
+from warp_mpm.errors import SimulationError
+from warp_mpm.guards import check_faults, check_memory, writable_directory
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.model import Model, build_model
 from warp_mpm.output.frame import Frame, SectionPicture
@@ -23,12 +23,12 @@ from warp_mpm.recorder import Recorder, StepRecord
 from warp_mpm.scene import Scene
 from warp_mpm.section import section_pressure
 from warp_mpm.solver import Solver
-from warp_mpm.state import State, memory_needed
+from warp_mpm.state import State
 from warp_mpm.summary import figures_of_merit, lit_explosive
 from warp_mpm.version import VERSION
 
 GROWTH = 1.1  # of the time step, at most; as in kernels.reduce
-MEMORY_SHARE = 0.9  # of the free memory that a run may take
+STEPS_AT_ONCE = 4  # on a GPU, so that the drift between two looks at it stays below a cell or two
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,12 @@ def simulate(
     """
     begin = time.perf_counter()
     run = _Run(scene, config or SolverConfig(), save or Save(), output, device, threads, progress or Silent())
-    run.to_the_end()
-    return run.finish(begin)
+    try:
+        run.to_the_end()
+    except (KeyboardInterrupt, SimulationError) as error:
+        run.finish(begin, "interrupted" if isinstance(error, KeyboardInterrupt) else f"failed: {error}")
+        raise
+    return run.finish(begin, "complete")
 
 
 class _Run:
@@ -91,9 +95,9 @@ class _Run:
         self.save = save
         self.progress = progress
         self.launcher = Launcher(find_device(device), threads)
-        self.output = None if output is None else _writable_directory(Path(output))
+        self.output = None if output is None else writable_directory(Path(output))
         self.model = build_model(scene, config, self.launcher.device)
-        _check_memory(self.model)
+        check_memory(self.model)
         progress.message(
             f"{scene.name}: {scene.particle_count:,} particles in {math.prod(scene.domain.cells):,} cells on "
             f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}; preparing kernels"
@@ -117,23 +121,23 @@ class _Run:
             next_frame = self._save_due(write, frames, 0, pictures, 0.0)
             now = 0.0
             while now < end:
-                due = frames[next_frame]
-                now = self._advance(due)
+                now = self._advance(min([frames[next_frame], *pictures[:1]]))
                 next_frame = self._save_due(write, frames, next_frame, pictures, now)
                 peak = self.history[-1]["peak_pressure_pa"]
                 self.progress.update(now, end, self.steps, f"peak {peak / 1e9:.2f} GPa")
 
-    def finish(self, begin: float) -> Result:
-        """Sum up, draw, and write the summary."""
+    def finish(self, begin: float, status: str) -> Result:
+        """Sum up what there is, and draw it."""
         self.launcher.close()
         record = self.recorder.result()
-        summary = self._summary(record, time.perf_counter() - begin)
+        summary = {"status": status, **self._summary(record, time.perf_counter() - begin)}
         if self.output is not None:
+            from warp_mpm.output.tables import write_summary
+
+            write_summary(self.output / "summary.json", summary)
             if self.save.figures:
                 self.progress.message("drawing figures")
                 self._draw(record, summary)
-            from warp_mpm.output.tables import write_summary
-
             summary["wall_s"] = time.perf_counter() - begin
             write_summary(self.output / "summary.json", summary)
         return Result(summary, self.history, record, tuple(self.pictures), self.state, self.output)
@@ -147,7 +151,7 @@ class _Run:
             self.recorder.record()
             self.steps += 1
         clock = self.state.clock_values()
-        self._check_faults()
+        check_faults(self.state, self.steps)
         self.solver.sort_if_due()
         self.solver_seconds += time.perf_counter() - begin
         return float(clock["time"])
@@ -160,26 +164,7 @@ class _Run:
         if not self.launcher.device.is_cuda or dt <= 0.0:
             return 1
         surely = math.floor(math.log1p((GROWTH - 1.0) * left / (GROWTH * dt)) / math.log(GROWTH))
-        return max(1, min(surely, 4))
-
-    def _check_faults(self) -> None:
-        """Stop when a particle moved absurdly far or out of the active cells.
-
-        Raises:
-            SimulationError: with the time, the step, the particle, its material and its position.
-        """
-        worst = int(self.state.faults.numpy().max())
-        if worst == 0:
-            return
-        index = worst - 1
-        clock = self.state.clock_values()
-        edges = np.cumsum([len(charge.positions) for charge in self.scene.charges])
-        charge = self.scene.charges[int(np.searchsorted(edges, index, side="right"))]
-        position = tuple(float(x) for x in self.state.positions()[index])
-        raise SimulationError(
-            f"{self.scene.name}: step {self.steps} at {clock['time'] * 1e6:.3f} us: particle {index} of "
-            f"{charge.name!r} ({charge.material.name}) at {position} m moved out of its reach; try a smaller cfl, or the defaults"
-        )
+        return max(1, min(surely, STEPS_AT_ONCE))
 
     def _save_due(self, write: Any, frames: np.ndarray, next_frame: int, pictures: list[float], now: float) -> int:
         """Save the frames and pictures whose instants have come; returns the next frame."""
@@ -302,52 +287,6 @@ def _solver_values(model: Model) -> dict[str, Any]:
     values = {item.name: getattr(model.config, item.name) for item in fields(model.config)}
     values = {name: value.value if isinstance(value, Enum) else value for name, value in values.items()}
     return {**values, "burn_width": model.burn_width}
-
-
-def _writable_directory(path: Path) -> Path:
-    """Make the run directory, and try to write there before anything is computed.
-
-    Raises:
-        InputError: it cannot be made or written.
-    """
-    probe = path / ".warp_mpm_probe"
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        probe.write_bytes(b"")
-        probe.unlink()
-    except OSError as error:
-        raise InputError(
-            f"output: expected a directory that can be written, got {str(path)!r} ({error.strerror}); "
-            "choose another one with -o"
-        ) from error
-    return path
-
-
-def _check_memory(model: Model) -> None:
-    """Refuse a run that does not fit into the free memory.
-
-    Raises:
-        InputError: with the numbers.
-    """
-    needed = memory_needed(model)
-    free = model.device.free_memory if model.device.is_cuda else _free_host_memory()
-    if free is not None and needed > MEMORY_SHARE * free:
-        raise InputError(
-            f"{model.scene.name}: expected a run that fits into the {free / 2**30:.1f} GiB of free memory, got "
-            f"{model.scene.particle_count:,} particles and {math.prod(model.scene.domain.cells):,} cells, which take "
-            f"{needed / 2**30:.1f} GiB; use a larger cell_size or fewer particles_per_axis"
-        )
-
-
-def _free_host_memory() -> int | None:
-    """Bytes that this machine can still give; None where the system does not tell."""
-    try:
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return None
 
 
 def _counted(count: int, noun: str) -> str:

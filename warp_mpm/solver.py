@@ -100,6 +100,9 @@ class Solver:
             )
         self._scatter(self._scatter_all)
         self._over_nodes(self._solve_all)
+        if model.config.order is Order.USF:  # which computes forces anew before it uses any
+            state.reactions.zero_()
+            state.pending_impulses.zero_()
 
     def _scatter(self, tasks: list[Task]) -> None:
         """Empty the active nodes, and scatter onto them."""
@@ -129,11 +132,9 @@ class Solver:
     def _record_clock(self) -> None:
         state, model = self.state, self.model
         slabs = model.slab_count
-        self._start_step = self.launcher.record(
-            reduce.start_step,
-            1,
-            [state.clock, wp.vec3(*model.spacing), model.viscosity.length, model.config.cfl, slabs, state.maxima],
-        )
+        damping = reduce.DAMPING if model.damped else 0.0
+        inputs = [state.clock, wp.vec3(*model.spacing), model.viscosity.length, model.config.cfl, damping]
+        self._start_step = self.launcher.record(reduce.start_step, 1, [*inputs, slabs, state.maxima])
         self._end_step = self.launcher.record(reduce.end_step, 1, [state.clock, slabs, state.maxima])
         self._collect_reactions = self.launcher.record(
             reduce.collect_reactions,

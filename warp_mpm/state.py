@@ -76,7 +76,9 @@ class State:
             source = getattr(self.particles, name)
             if len(source) == n:
                 target = wp.empty_like(source)
-                wp.launch(order.permute, n, inputs=[source, self._order, target], device=self.device)
+                wp.launch(
+                    order.permute_kernel(source.dtype), n, inputs=[source, self._order, target], device=self.device
+                )
                 setattr(self.particles, name, target)
         groups = model.slab_count * len(model.charges)
         starts = wp.zeros(groups + 1, dtype=int, device=self.device)

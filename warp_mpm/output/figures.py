@@ -48,7 +48,7 @@ STYLE: dict[Any, Any] = {
 MARK = "#35c4f0"  # detonators and theory: a blue that the colour map does not have
 SERIES = ("#b5367a", "#2a78b5", "#1b1b1b", "#e69f00")  # lines: told apart by colour-blind readers too
 
-_FAINT = 0.005  # share of the colour range below which gas is not worth showing
+_FAINT = 0.02  # share of the colour range below which gas is not worth showing
 _THIN_CELLS = 4  # a section with fewer cells across is a line, and drawn as profiles
 _AXIS_NAMES = "xyz"
 
@@ -68,15 +68,15 @@ def section_figure(
         path: the PNG file to write.
         scene: where the detonators and the charges are.
         pictures: at least one, pressures (nodes_u, nodes_v) [Pa].
-        pressure_range: first and last colour [Pa]; None: zero to nearly the highest pressure shown.
+        pressure_range: first and last colour [Pa]; None: zero to nearly the highest, at most 1.6 p_CJ.
 
     Raises:
         SimulationError: the file cannot be written.
     """
-    lower, upper = pressure_range or (0.0, _robust_maximum([picture.pressure for picture in pictures]))
+    pressure_range = pressure_range or _colors_for(scene, [picture.pressure for picture in pictures])
     thin = min(scene.domain.cells[axis] for axis in scene.section.in_plane) < _THIN_CELLS
     with rc_context(STYLE):
-        _save(_profiles(scene, pictures) if thin else _panels(scene, pictures, (lower, upper)), path)
+        _save(_profiles(scene, pictures) if thin else _panels(scene, pictures, pressure_range), path)
 
 
 def front_figure(
@@ -90,12 +90,12 @@ def front_figure(
         path: the PNG file to write.
         scene: its line, its detonators and its explosive.
         record: field pressure along the line at every step.
-        pressure_range: first and last colour [Pa]; None: zero to nearly the highest pressure shown.
+        pressure_range: first and last colour [Pa]; None: zero to nearly the highest, at most 1.6 p_CJ.
 
     Raises:
         SimulationError: the file cannot be written.
     """
-    lower, upper = pressure_range or (0.0, _robust_maximum([record.pressure]))
+    lower, upper = pressure_range or _colors_for(scene, [record.pressure])
     distance = record.distance / MILLIMETRE
     with rc_context(STYLE):
         figure = _new_figure((5.6, 5.6))
@@ -116,8 +116,8 @@ def front_figure(
         axes.set_ylabel("time [µs]")
         peak.plot(distance, record.pressure.max(axis=0) / GIGAPASCAL, color=SERIES[0])
         peak.set_ylabel("peak [GPa]")
-        peak.set_ylim(0.0, 1.1 * float(record.pressure.max()) / GIGAPASCAL)
         _draw_theory(peak, scene)
+        peak.set_ylim(bottom=0.0)
         _draw_color_bar(figure, image, axes, scene, shrink=1.0)
         _save(figure, path)
 
@@ -145,7 +145,7 @@ def energy_figure(path: str | Path, history: Sequence[Mapping[str, float]]) -> N
         axes.set_xlim(time[0], time[-1])
         axes.set_ylim(bottom=0.0)
         axes.set_xlabel("time [µs]")
-        axes.set_ylabel("energy [kJ]")
+        axes.set_ylabel("energy in the domain [kJ]")
         figure.legend(loc="outside upper center", ncols=len(curves))
         _save(figure, path)
 
@@ -283,10 +283,10 @@ def _profiles(scene: Scene, pictures: Sequence[SectionPicture]) -> Figure:
     for detonator in scene.detonators:
         axes.axvline(detonator.position[long_axis] / MILLIMETRE, color=MARK, linewidth=1.0)
     axes.set_xlim(nodes[0] / MILLIMETRE, nodes[-1] / MILLIMETRE)
-    axes.set_ylim(bottom=0.0)
     axes.set_xlabel(f"{_AXIS_NAMES[long_axis]} [mm]")
     axes.set_ylabel("pressure [GPa]")
     _draw_theory(axes, scene)
+    axes.set_ylim(bottom=0.0)
     figure.legend(loc="outside right upper")
     return figure
 
@@ -313,9 +313,7 @@ def _draw_fronts(axes: Axes, scene: Scene, record: LineRecord) -> None:
     label = f"fronts at D = {speed:.0f} m/s"
     axes.plot(along / MILLIMETRE, arrival / MICROSECOND, color=MARK, linewidth=0.9, linestyle=(0, (6, 3)), label=label)
     axes.set_ylim(record.time[0] / MICROSECOND, record.time[-1] / MICROSECOND)
-    axes.legend(
-        loc="upper right", frameon=True, facecolor="black", edgecolor="none", framealpha=0.5, labelcolor="white"
-    )
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
 
 
 def _draw_color_bar(figure: Figure, image: AxesImage, beside: Axes | np.ndarray, scene: Scene, shrink: float) -> None:
@@ -350,7 +348,12 @@ def _cj_pressure(scene: Scene) -> float | None:
     return explosive.cj.pressure / GIGAPASCAL if explosive is not None and explosive.cj is not None else None
 
 
-def _robust_maximum(pressures: Sequence[np.ndarray]) -> float:
-    """A pressure [Pa] that each array stays below but for its highest 1 %, rounded up to a tenth of a gigapascal."""
-    highest = max(float(np.quantile(pressure, 0.99)) for pressure in pressures)
-    return math.ceil(max(highest, 1.0) / (0.1 * GIGAPASCAL)) * 0.1 * GIGAPASCAL
+def _colors_for(scene: Scene, pressures: Sequence[np.ndarray]) -> tuple[float, float]:
+    """First and last colour [Pa]: zero, and what each array stays below but for its highest 0.3 %.
+
+    Brief focusing in a corner would leave the fronts dark, so 1.6 p_CJ is the limit, as in the USD file.
+    """
+    highest = max(float(np.quantile(pressure, 0.997)) for pressure in pressures) / GIGAPASCAL
+    cj_pressure = _cj_pressure(scene)
+    limit = math.inf if cj_pressure is None else 1.6 * cj_pressure
+    return 0.0, max(min(math.ceil(10.0 * highest) / 10.0, limit), 1e-3) * GIGAPASCAL

@@ -102,11 +102,10 @@ def _usd_lines(stage: Any) -> Iterator[str]:
 def _time_line(stage: Any) -> str:
     """Number of frames and their times."""
     prim = stage.GetDefaultPrim()
-    clock = prim.GetAttribute("blast:time") if prim else None
-    codes = clock.GetTimeSamples() if clock else []
+    codes = prim.GetAttribute("blast:time").GetTimeSamples() if prim and prim.HasAttribute("blast:time") else []
     if not codes:
         return f"time codes {stage.GetStartTimeCode():g} to {stage.GetEndTimeCode():g}"
-    first, last = (clock.Get(code) / MICROSECOND for code in (codes[0], codes[-1]))
+    first, last = (prim.GetAttribute("blast:time").Get(code) / MICROSECOND for code in (codes[0], codes[-1]))
     return f"{len(codes)} frames, time codes {codes[0]:g} to {codes[-1]:g}, {first:.1f} to {last:.1f} µs"
 
 
@@ -130,6 +129,8 @@ def _primvar_note(primvar: Any) -> str:
         return f"{kind}, {len(primvar.Get() or ())} values, indexed, {samples} samples"
     attribute = primvar.GetAttr()
     samples = attribute.GetTimeSamples()
+    if attribute.GetRoleName():
+        return f"{kind}, {len(samples)} samples"
     lower, upper = _range(attribute, samples or [Usd.TimeCode.Default()])
     span = f", {lower:.4g} to {upper:.4g}" if lower <= upper else ""
     return f"{kind}, {len(samples)} samples{span}"

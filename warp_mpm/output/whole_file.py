@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from warp_mpm.errors import SimulationError
@@ -23,7 +23,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         raise write_error(path, error) from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # it is gone after a good end, and what hinders this hindered the block
+            part.unlink()
 
 
 def write_error(path: Path, error: OSError) -> SimulationError:
