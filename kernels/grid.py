@@ -48,10 +48,14 @@ def is_empty(node: vector8) -> bool:
 
 @wp.kernel(enable_backward=False)
 def clear(grid: Grid, begin: int):
-    """Empty the active nodes."""
+    """Empty the active nodes.
+
+    A ghost to which nothing was scattered has the values of its image all the same: every lane is looked at.
+    """
     node = active_node(grid, begin + wp.tid())
     n = node_index(grid, node[0], node[1], node[2])
-    if not is_empty(grid.node[n]):
+    clean = grid.node[n] == vector8() and grid.reprojected[n] == vector4()
+    if not clean:
         grid.node[n] = vector8()
         grid.pressure[n] = ZERO
         grid.reprojected[n] = vector4()

@@ -68,15 +68,16 @@ def block(
 ) -> Scene:
     """A block of `cells` cubes of 10 mm from the origin on, of the paper's explosive if no material is given.
 
-    Without other detonators the explosive is lit at the origin. `margin_cells` of vacuum, one number or one for each
+    Without other detonators an explosive is lit at the origin. `margin_cells` of vacuum, one number or one for each
     face, lie between the block and the faces of the domain.
     """
+    material = material or explosive()
     builder = SceneBuilder("block")
     box = Box((0.0, 0.0, 0.0), (cells[0] * CELL, cells[1] * CELL, cells[2] * CELL))
     builder.domain(box.lower, box.upper, cells=cells, margins=np.multiply(margin_cells, CELL).tolist())
     builder.walls(walls or Walls())
-    builder.charge(box, material or explosive(), particles_per_axis=particles_per_axis, name="block")
-    for detonator in detonators if material else (detonators or (CORNER,)):
+    builder.charge(box, material, particles_per_axis=particles_per_axis, name="block")
+    for detonator in detonators or ((CORNER,) if material.burn else ()):
         builder.detonator(detonator)
     builder.gravity(gravity)
     builder.ambient_pressure(ambient_pressure)

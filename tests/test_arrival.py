@@ -13,9 +13,10 @@ from scenes_for_tests import CELL, ROUND_OFF, block, explosive, start
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.detonators import PlaneDetonator, PointDetonator
 from warp_mpm.geometry import Box
-from warp_mpm.materials import ammonium_nitrate, explosive as make_explosive  # fmt: skip
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.kernels.precision import NEVER
+from warp_mpm.materials import ammonium_nitrate
+from warp_mpm.materials import explosive as make_explosive
 
 SPEED = 2800.0
 EXACT = 4 * ROUND_OFF * 100e-6  # [s]
@@ -67,7 +68,7 @@ def test_plane_detonators(normal, device):
     place, times, boosters = arrival(detonators, device=device)
     distance = np.abs((place - detonators[0].position) @ np.array(normal)) / np.linalg.norm(normal)
     np.testing.assert_allclose(times, 2e-6 + distance / SPEED, rtol=0, atol=EXACT)
-    assert np.all(boosters == float(NEVER))
+    assert np.all(boosters == np.float32(float(NEVER)))
 
 
 def test_points_and_planes_together(device):
@@ -134,6 +135,7 @@ def test_the_adjusted_speed_is_the_one_that_runs(device):
         equation_of_state=IdealGas(2.0),
         energy=ammonium_nitrate().specific_energy,
     )
-    scene = block((10, 2, 2), material=adjusted, detonators=[DELAYED[0]]) if False else None
-    assert scene is None
-    assert adjusted.burn.detonation_speed == pytest.approx(SPEED, rel=1e-5)
+    scene = block((10, 2, 2), material=adjusted)
+    times = start(scene, device).state.field("arrival_time")
+    expected = np.linalg.norm(scene.charges[0].positions, axis=1) / SPEED
+    np.testing.assert_allclose(times, expected, rtol=1e-5)  # the energy has the digits of single precision

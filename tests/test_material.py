@@ -153,7 +153,7 @@ def test_particles_burn_as_their_arrival_times_say(device):
     boosted = {d.time: np.linalg.norm(place - d.position, axis=1) <= CELL for d in (early, late)}
     before = np.zeros(state.count)
     lit_late = []
-    for _ in range(40):
+    for _ in range(25):
         now = float(state.clock_values()["time"])
         burnt = state.field("burn_fraction")
         expected = np.clip((now - state.field("arrival_time")) / duration, 0.0, 1.0)

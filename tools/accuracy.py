@@ -94,8 +94,12 @@ def taylor_table(console: Console) -> Table:
 
 def paper_table(console: Console) -> Table:
     """Front and collision pressures of the paper's scenes, conservation errors, and mirror symmetry."""
-    columns = ("front GPa", "front m/s", "residual cells", "offset cells", "collisions GPa", "ratio", "asymmetry")
-    table = _table("The paper's scenes at the defaults", ("scene", *columns, "energy", "mass", "momentum", "s"))
+    columns = ("front", "gauges", "m/s", "residual", "offset", "collisions", "ratio", "mirror", "energy", "mass")
+    table = _table(
+        "The paper's scenes at the defaults: pressures in GPa, residual and offset of the front in cells, mirror "
+        "asymmetry in p_CJ",
+        ("scene", *columns, "momentum", "s"),
+    )
     for name, parameters in PAPER_RUNS:
         label = _label(name, parameters)
         console.print(f"paper: {label}")
@@ -107,22 +111,32 @@ def paper_table(console: Console) -> Table:
         table.add_row(
             label,
             f"{figures['front_pressure_pa'] / GIGA:.3f}",
+            f"{figures['front_gauge_pressure_pa'] / GIGA:.3f}",
             f"{figures['front_speed_m_s']:.0f}",
             f"{figures['front_fit_residual_m'] / cell:.2f}",
             f"{figures['front_offset_m'] / cell:+.2f}",
             " ".join(f"{pressure / GIGA:.2f}" for pressure in collisions),
             f"{max(collisions) / figures['front_pressure_pa']:.2f}",
-            f"{asymmetry(result.state.field_pressure(), name) / figures['p_cj_pa']:.0e}",
+            f"{asymmetry(scene, result.state.field_pressure()) / figures['p_cj_pa']:.0e}",
             *(f"{figures[key]:.0e}" for key in ("energy_error", "mass_error", "momentum_error")),
             f"{figures['wall_s']:.0f}",
         )
     return table
 
 
-def asymmetry(field: np.ndarray, name: str) -> float:
-    """Largest difference of the field pressure at the end from its mirror images [Pa]."""
-    axes = (0, 1, 2) if name == "two_point" else (0, 2)
-    return max(float(np.abs(field - np.flip(field, axis)).max()) for axis in axes)
+def asymmetry(scene: mpm.Scene, field: np.ndarray) -> float:
+    """Largest difference of the field pressure at the end from its mirror images [Pa].
+
+    The two layers of nodes next to an open face are left out: which of two mirror images leaves a step earlier is a
+    matter of round-off, and a whole particle's pressure goes with it.
+    """
+    kept = tuple(
+        slice(2 if low is mpm.Wall.OPEN else 0, -2 if high is mpm.Wall.OPEN else None)
+        for low, high in zip(scene.walls.faces()[0::2], scene.walls.faces()[1::2], strict=True)
+    )
+    inner = field[kept]
+    axes = (0, 1, 2) if scene.name == "two_point" else (0, 2)
+    return max(float(np.abs(inner - np.flip(inner, axis)).max()) for axis in axes)
 
 
 def vacuum_table(console: Console) -> Table:
