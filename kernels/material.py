@@ -95,29 +95,27 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
                 row_sums = vector8()
                 row_nodal = vector4()
                 row_squared = ZERO
-                slope = ZERO
-                second_slope = ZERO
+                row_across = vector8()  # the same by slopes along z
+                nodal_across = vector4()
                 for k in range(width):
                     node = grid.node[row + k]
                     row_sums = multiply_add8(row_sums, wz[k], node)
-                    slope += sz[k] * node[2]
+                    row_across = multiply_add8(row_across, sz[k], node)
                     if wp.static(reprojected):
                         nodal = grid.reprojected[row + k]
                         row_nodal = multiply_add4(row_nodal, wz[k], nodal)
-                        second_slope += sz[k] * nodal[2]
+                        nodal_across = multiply_add4(nodal_across, sz[k], nodal)
                         if wp.static(damped):
                             relative = vector3(nodal[0], nodal[1], nodal[2]) - velocity
                             row_squared += wz[k] * wp.dot(relative, relative)
-                    if wp.static(end):
-                        second_slope += sz[k] * node[6]
                 sums = multiply_add8(sums, wij, row_sums)
                 nodal_sums = multiply_add4(nodal_sums, wij, row_nodal)
                 slip_squared += wij * row_squared
-                divergence += gx * row_sums[0] + gy * row_sums[1] + wij * slope
+                divergence += gx * row_sums[0] + gy * row_sums[1] + wij * row_across[2]
                 if wp.static(reprojected):
-                    second_divergence += gx * row_nodal[0] + gy * row_nodal[1] + wij * second_slope
+                    second_divergence += gx * row_nodal[0] + gy * row_nodal[1] + wij * nodal_across[2]
                 if wp.static(end):
-                    second_divergence += gx * row_sums[4] + gy * row_sums[5] + wij * second_slope
+                    second_divergence += gx * row_sums[4] + gy * row_sums[5] + wij * row_across[6]
         result = StrainIncrement()
         result.motion = vector3(sums[0], sums[1], sums[2]) + dt * vector3(sums[4], sums[5], sums[6])
         result.divergence = divergence
