@@ -319,7 +319,8 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         burnt = ONE
         if wp.static(burns):
             burnt = particles.burn_fraction[p]
-        if wp.static(damped) and burnt > BURNT_OUT:
+        # An ambient pressure pushes on volumes, which the relaxation would then change without doing work.
+        if wp.static(damped) and burnt > BURNT_OUT and ambient_pressure == ZERO:
             sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
             onset = (burnt - BURNT_OUT) / (ONE - BURNT_OUT)
             density = relax_density(density, strained.filling, onset * dt * sound_speed / viscosity.length)

@@ -84,7 +84,10 @@ def place(
     result = Place()
     result.left_through = -1
     result.moved = wp.max(wp.abs(displacement[0]), wp.max(wp.abs(displacement[1]), wp.abs(displacement[2])))
-    if not (result.moved < FARTHEST):  # also true for NaN
+    # Axis by axis: the maximum of NaN and a number may be the number.
+    near = wp.abs(displacement[0]) < FARTHEST and wp.abs(displacement[1]) < FARTHEST
+    near = near and wp.abs(displacement[2]) < FARTHEST
+    if not near:
         result.moved = ZERO
         result.fault = True
         return result

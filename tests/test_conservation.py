@@ -173,16 +173,7 @@ def test_ambient_pressure_does_work(transfer, walls, device):
 
 
 @pytest.mark.parametrize(
-    "transfer",
-    [
-        Transfer.FLIP,
-        Transfer.APIC,
-        pytest.param(
-            Transfer.DAMPED_FLIP,
-            marks=pytest.mark.xfail(strict=True, reason="with p_ambient > 0 relaxing density moves surfaces"),
-        ),
-    ],
-    ids=lambda transfer: transfer.value,
+    "transfer", [Transfer.FLIP, Transfer.APIC, Transfer.DAMPED_FLIP], ids=lambda transfer: transfer.value
 )
 def test_gas_at_ambient_pressure_stays_at_rest(transfer, device):
     """With p = p_ambient everywhere there is no force, though density and pressure end abruptly at the gas's surface.

@@ -65,14 +65,14 @@ def test_every_variant_runs(order, transfer, shape, device):
 
 
 def run_on(threads, **config):
-    """Bits of everything after 40 steps over five slabs, some of which gas enters, and leaves through an open face."""
+    """Bits of everything after 60 steps over five slabs, some of which gas enters, and leaves through an open face."""
     scene = block(
         (70, 4, 3),
         walls=Walls(x_high=Wall.OPEN, y_high=Wall.STICK),
-        margin_cells=(0, 6, 0, 0, 0, 0),
+        margin_cells=(0, 3, 0, 0, 0, 0),
         detonators=[PointDetonator((0.0, 0.0, 0.0)), PointDetonator((0.7, 0.0, 0.0)), PointDetonator((0.3, 0.0, 0.0))],
     )
-    solver = advance(start(scene, threads=threads, **config), 40)
+    solver = advance(start(scene, threads=threads, **config), 60)
     state = solver.state
     totals = totals_of(solver)
     assert len(solver.model.scene.charges) == 1
@@ -105,7 +105,7 @@ def test_any_number_of_threads_gives_the_same_bits(order, transfer, monkeypatch)
         shared = run_on(threads, order=order, transfer=transfer)
         for name, expected in alone.items():
             np.testing.assert_array_equal(shared[name], expected, err_msg=f"{name}, {threads} threads")
-    assert len(submitted) > 2 * 40 * 10  # the pool was really used
+    assert len(submitted) > 2 * 60 * 10  # the pool was really used
 
 
 # ---- identity --------------------------------------------------------------------------------------------------------
@@ -218,13 +218,12 @@ PLACES = {  # cell, fraction and displacement along x -> cell, fraction, face le
     "through the open low face": ((0, 0.25, -0.5), (0, 0.0, 0, False)),
     "past the active cells": ((7, 0.75, 0.5), (8, 0.25, -1, True)),
     "absurdly far": ((3, 0.25, 4.5), (None, None, -1, True)),
-    "nowhere": ((3, 0.25, np.nan), (None, None, -1, True)),
 }
 
 
 @pytest.mark.parametrize("case", PLACES.values(), ids=PLACES.keys())
 def test_where_a_particle_goes(case, device):
-    """A cell and a fraction of it, 0 <= f < 1; out through an open face; a fault if its stencil would leave the arrays."""
+    """A cell and a fraction of it, 0 <= f < 1; out through an open face; a fault where no stencil may go."""
     (cell, fraction, way), (new_cell, new_fraction, face, fault) = case
     row = placed((cell, 5, 5), (fraction, 0.5, 0.5), (way, 0.0, 0.0), device)
     assert row[6] == face
@@ -234,6 +233,17 @@ def test_where_a_particle_goes(case, device):
         assert row[3] == np.float32(new_fraction)
         assert tuple(row[1:3]) == (5.0, 5.0)
         assert tuple(row[4:6]) == (0.5, 0.5)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("way", [np.nan, 4.5, -np.inf])
+def test_no_way_is_too_far_along_one_axis(axis, way, device):
+    """One component that is no number, or too large, is a fault whatever the others are."""
+    ways = np.zeros(3)
+    ways[axis] = way
+    row = placed((3, 5, 5), (0.25, 0.5, 0.5), ways, device)
+    assert row[7] == 1.0
+    assert row[6] == -1.0
 
 
 @pytest.mark.parametrize(("cell", "fraction", "way"), [(0, 0.0, -1e-4), (9, 0.99999, 1e-3), (0, 0.5, -0.75)])
@@ -318,7 +328,7 @@ def test_a_fast_particle_shortens_the_step(device):
 
 @pytest.mark.parametrize("cfl", [0.1, 0.3])
 def test_the_first_step_of_a_fresh_charge(cfl, device):
-    """dt = cfl h / D while anything is unburnt, with h the smallest spacing: here 8 mm of 8 x 10 x 12."""
+    """A step of cfl h / D while anything is unburnt, with h the smallest spacing: here 8 mm of 8 x 10 x 12."""
     builder = SceneBuilder("brick")
     box = Box((0.0, 0.0, 0.0), (0.08, 0.1, 0.12))
     builder.domain(box.lower, box.upper, cells=(10, 10, 10))
@@ -330,12 +340,12 @@ def test_the_first_step_of_a_fresh_charge(cfl, device):
 
 
 def test_the_step_obeys_its_limits(device):
-    """dt <= cfl h / max(c + |v|, D while unburnt), at most 10 % above the last; most steps are as long as allowed.
+    """At most cfl h / max(c + |v|, D while unburnt) and 10 % above the last step; most are as long as allowed.
 
     The limits are those of the state before the step. Without viscosity only the strain rate can shorten it further.
     """
     solver = start(block((12, 3, 2)), device, viscosity=(0.0, 0.0))
-    last, at_limit, growing = None, 0, 0
+    last, at_limit = None, 0
     for step in range(80):
         values = particle_values(solver.state)
         sound = np.sqrt(2.0 * values["energy"].astype(np.float64))  # gamma (gamma - 1) e
@@ -346,12 +356,11 @@ def test_the_step_obeys_its_limits(device):
         dt = float(solver.state.clock_values()["dt"])
         limit = 0.3 * CELL / fastest
         if last is not None and 1.1 * last < limit:
-            limit, growing = 1.1 * last, growing + 1
+            limit = 1.1 * last
         assert dt <= limit * (1.0 + 8 * ROUND_OFF), f"step {step}"
         at_limit += dt > limit * (1.0 - 1e-5)
         last = dt
     assert at_limit > 60
-    assert growing >= 0
 
 
 def test_a_step_grows_by_a_tenth_at_most(device):
