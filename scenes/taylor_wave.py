@@ -21,7 +21,7 @@ def scene(*, cell_size: float = 3e-3, particles_per_axis: int = 2) -> Scene:
     room = RUN + SPARE_CELLS * edge  # into a vacuum the products escape backwards as fast as the front runs
 
     builder = SceneBuilder("taylor_wave")
-    builder.domain(column.lower, column.upper, cell_size=cell_size, margins=(room, 0.0, 0.0, 0.0, 0.0, 0.0))
+    builder.domain(column.lower, column.upper, cell_size=edge, margins=(room, 0.0, 0.0, 0.0, 0.0, 0.0))
     builder.walls(Walls(x_low=Wall.OPEN))
     builder.charge(column, explosive, particles_per_axis=particles_per_axis, name="column")
     builder.detonator(PlaneDetonator((0.0, 0.0, 0.0), normal=(1.0, 0.0, 0.0)))

@@ -148,11 +148,7 @@ def test_a_front_from_one_end_pushes_the_far_wall(device):
 @conservative
 @pytest.mark.parametrize("walls", ["free", "mixed"])
 def test_ambient_pressure_does_work(transfer, walls, device):
-    """E(t) + p_ambient (V(t) - V(0)) = E(0): the work on the ambient is tallied from the very strains of the force.
-
-    Its sum over the steps and p_ambient dV differ by how well density follows volume: the density takes another
-    velocity than the work does (`kernels/material.py`), and is relaxed by the damping.
-    """
+    """E(t) + W_ambient = E(0): the work on the ambient is tallied from the very strains of the force."""
     ambient = 2e8
     free = walls == "free"
     scene = block(
@@ -168,13 +164,29 @@ def test_ambient_pressure_does_work(transfer, walls, device):
     assert audit.energy_error < EXACT
     assert audit.momentum_error < EXACT
     assert after.ambient_work > 0.1 * before.internal
-    if free:
-        assert after.ambient_work == pytest.approx(ambient * (after.volume - before.volume), rel=0.1)
 
 
-@pytest.mark.parametrize(
-    "transfer", [Transfer.FLIP, Transfer.APIC, Transfer.DAMPED_FLIP], ids=lambda transfer: transfer.value
-)
+@conservative
+def test_ambient_work_is_pressure_times_volume(transfer, device):
+    """W_ambient = p_ambient (V(t) - V(0)), to the first order of the time step: a third of it, a third of the error.
+
+    The density takes another velocity than the work does (`kernels/material.py`), and both are those of a step.
+    """
+    ambient, errors = 2e8, []
+    scene = block(BLOCK, walls=OPEN, margin_cells=12, ambient_pressure=ambient, end_time=43e-6)
+    for cfl in (0.3, 0.1):
+        solver = start(scene, device, transfer=transfer, cfl=cfl)
+        before = totals_of(solver)
+        while float(solver.state.clock_values()["time"]) < scene.end_time:
+            advance(solver, 1)
+        after = totals_of(solver)
+        assert after.volume > 2.0 * before.volume
+        errors.append(after.ambient_work / (ambient * (after.volume - before.volume)) - 1.0)
+    assert abs(errors[0]) < 0.02
+    assert abs(errors[1]) < 0.5 * abs(errors[0])
+
+
+@transfers
 def test_gas_at_ambient_pressure_stays_at_rest(transfer, device):
     """With p = p_ambient everywhere there is no force, though density and pressure end abruptly at the gas's surface.
 
@@ -202,6 +214,23 @@ def test_the_papers_scene_conserves_everything(transfer, confinement, device):
     assert summary["momentum_error"] < EXACT
     assert summary["mass_error"] < EXACT
     assert sum(summary["mass_out_kg"].values()) == 0.0
+
+
+def test_a_closed_box_stays_full(device):
+    """The particles' volumes go on filling a rigid box, to the issue's 0.2 %, over many echoes of the detonation.
+
+    For a gamma law volumes are passive, so that no other audit sees them drift: without the damping's relaxation of
+    density they do, by 0.7 % here (DESIGN.md, section 3.1).
+    """
+    volumes = []
+    for transfer in (Transfer.DAMPED_FLIP, Transfer.FLIP):
+        scene = block(BLOCK)
+        solver = start(scene, device, transfer=transfer)
+        history = [totals_of(advance(solver, 100)).volume for _ in range(5)]
+        volumes.append(np.array(history) / scene.charges[0].volume)
+    damped, plain = volumes
+    assert np.abs(damped - 1.0).max() < 0.002
+    assert np.abs(plain - 1.0).max() > np.abs(damped - 1.0).max()
 
 
 def test_damping_only_heats(device):

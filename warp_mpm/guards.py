@@ -10,6 +10,7 @@ from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.model import Model
 from warp_mpm.state import State, memory_needed
 
+MOST_NODES = 2**31 - 1
 MEMORY_SHARE = 0.9  # of the free memory that a run may take
 
 
@@ -38,13 +39,19 @@ def check_memory(model: Model) -> None:
     Raises:
         InputError: with the numbers.
     """
+    nodes = math.prod(n + 3 for n in model.scene.domain.cells)
+    if nodes > MOST_NODES:
+        raise InputError(
+            f"{model.scene.name}: expected at most {MOST_NODES:,} nodes, which 32-bit indices reach, got {nodes:,}; "
+            "use a larger cell_size or a smaller margin"
+        )
     needed = memory_needed(model)
     free = model.device.free_memory if model.device.is_cuda else _free_host_memory()
     if free is not None and needed > MEMORY_SHARE * free:
         raise InputError(
             f"{model.scene.name}: expected a run that fits into the {free / 2**30:.1f} GiB of free memory, got "
             f"{model.scene.particle_count:,} particles and {math.prod(model.scene.domain.cells):,} cells, which take "
-            f"{needed / 2**30:.1f} GiB; use a larger cell_size or fewer particles_per_axis"
+            f"{needed / 2**30:.1f} GiB; use a larger cell_size, a smaller domain or fewer particles_per_axis"
         )
 
 
