@@ -8,6 +8,7 @@ import functools
 
 import warp as wp
 
+from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid, stamp_block
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index, raise_maximum
 from warp_mpm.kernels.walls import (
@@ -15,6 +16,7 @@ from warp_mpm.kernels.walls import (
     free_components,
     ghost_sides,
     image_count,
+    image_index,
     image_node,
     image_sides,
     image_signs,
@@ -24,41 +26,19 @@ from warp_mpm.kernels.walls import (
 )
 
 
-@wp.func
-def active_node(grid: Grid, index: int) -> wp.vec3i:
-    """The node of a flat index into the active nodes, ghosts included."""
-    count_y = grid.active_upper[1] - grid.active_lower[1] + 3
-    count_z = grid.active_upper[2] - grid.active_lower[2] + 3
-    row = index // count_z
-    return wp.vec3i(
-        row // count_y + grid.active_lower[0] - 1,
-        row % count_y + grid.active_lower[1] - 1,
-        index % count_z + grid.active_lower[2] - 1,
-    )
-
-
-@wp.func
-def is_empty(node: vector8) -> bool:
-    """Whether nothing was scattered to a node: no mass, and no force either, which may come without mass.
-
-    Most active nodes are empty once gas flies apart; reading them is cheap, writing is not.
-    """
-    return node[3] == ZERO and node[4] == ZERO and node[5] == ZERO and node[6] == ZERO
-
-
 @wp.kernel(enable_backward=False)
-def clear(grid: Grid, begin: int):
-    """Empty the active nodes.
-
-    A ghost to which nothing was scattered has the values of its image all the same: every lane is looked at.
-    """
-    node = active_node(grid, begin + wp.tid())
-    n = node_index(grid, node[0], node[1], node[2])
-    clean = grid.node[n] == vector8() and grid.reprojected[n] == vector4()
-    if not clean:
-        grid.node[n] = vector8()
-        grid.pressure[n] = ZERO
-        grid.reprojected[n] = vector4()
+def clear(grid: Grid, clock: wp.array(dtype=Clock), begin: int):
+    """Empty the nodes of the blocks that the last scatter, one step ago, wrote to."""
+    thread = wp.tid()
+    block = begin + thread // grid.workers
+    if is_active(grid, block, clock[0].step - 1):
+        for n in range(thread % grid.workers, NODES, grid.workers):
+            index = node_of_block(grid, block, n)
+            if on_grid(grid, index):
+                m = node_index(grid, index[0], index[1], index[2])
+                grid.node[m] = vector8()
+                grid.pressure[m] = ZERO
+                grid.reprojected[m] = vector4()
 
 
 @wp.func
@@ -154,8 +134,9 @@ def mirror(
     acceleration: vector3,
     filling: scalar,
     pressure: scalar,
+    step: int,
 ):
-    """Write a node's values into its ghosts."""
+    """Write a node's values into its ghosts, and stamp their blocks, so that they are cleared like the others."""
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
@@ -167,6 +148,8 @@ def mirror(
                     a = wp.cw_mul(s, acceleration)
                     grid.node[m] = vector8(v[0], v[1], v[2], grid.node[m][3], a[0], a[1], a[2], filling)
                     grid.pressure[m] = pressure
+                    ghost = image_index(grid, index, sides)
+                    stamp_block(grid, ghost[0], ghost[1], ghost[2], step)
 
 
 @functools.cache
@@ -179,8 +162,8 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
     inside the domain goes to `peaks`.
     """
 
-    @wp.kernel(enable_backward=False, module="unique")
-    def solve(
+    @wp.func
+    def solve_node(
         grid: Grid,
         boundary: Boundary,
         pic_share: scalar,
@@ -188,19 +171,15 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
         impulses: wp.array(dtype=wp.float64),
         peaks: wp.array(dtype=scalar),
         slot: int,
-        begin: int,
+        step: int,
+        index: wp.vec3i,
     ):
-        index = active_node(grid, begin + wp.tid())
-        if not is_owner(boundary, grid.cells, index):
-            return
         n = node_index(grid, index[0], index[1], index[2])
         own = grid.node[n]
         total = own
         energy = grid.pressure[n]
         owned = ghost_sides(boundary, grid.cells, index)
         ghosts = owned[0] + owned[1] + owned[2] > 0
-        if is_empty(own) and not ghosts:
-            return
         free = free_components(boundary, grid.cells, index)
         if ghosts:
             total = fold(grid, boundary, index, owned)
@@ -229,11 +208,32 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
                 tally_walls(grid, boundary, index, owned, True, mass, ONE, acceleration, reactions, slot)
             if wp.static(momentum) and pic_share > ZERO:
                 tally_walls(grid, boundary, index, owned, False, mass, pic_share, velocity, impulses, slot)
-            mirror(grid, boundary, index, owned, velocity, acceleration, filling, pressure)
+            mirror(grid, boundary, index, owned, velocity, acceleration, filling, pressure, step)
         grid.node[n] = vector8(
             velocity[0], velocity[1], velocity[2], mass, acceleration[0], acceleration[1], acceleration[2], filling
         )
         grid.pressure[n] = pressure
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def solve(
+        grid: Grid,
+        boundary: Boundary,
+        clock: wp.array(dtype=Clock),
+        pic_share: scalar,
+        reactions: wp.array(dtype=wp.float64),
+        impulses: wp.array(dtype=wp.float64),
+        peaks: wp.array(dtype=scalar),
+        slot: int,
+        begin: int,
+    ):
+        thread = wp.tid()
+        block = begin + thread // grid.workers
+        step = clock[0].step
+        if is_active(grid, block, step):
+            for n in range(thread % grid.workers, NODES, grid.workers):
+                index = node_of_block(grid, block, n)
+                if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
+                    solve_node(grid, boundary, pic_share, reactions, impulses, peaks, slot, step, index)
 
     return solve
 
@@ -252,24 +252,13 @@ def fold_reprojected(grid: Grid, boundary: Boundary, index: wp.vec3i, owned: wp.
     return total
 
 
-@wp.kernel(enable_backward=False)
-def solve_reprojected(
-    grid: Grid,
-    boundary: Boundary,
-    clock: wp.array(dtype=Clock),
-    impulses: wp.array(dtype=wp.float64),
-    slot: int,
-    begin: int,
+@wp.func
+def solve_reprojected_node(
+    grid: Grid, boundary: Boundary, alpha: scalar, impulses: wp.array(dtype=wp.float64), slot: int, index: wp.vec3i
 ):
-    """Re-projected sums -> velocity v_r and the damping's heat H = alpha (sum w m v^2 / 2 / M - |v_r|^2 / 2) >= 0."""
-    index = active_node(grid, begin + wp.tid())
-    if not is_owner(boundary, grid.cells, index):
-        return
+    """One node of `solve_reprojected`."""
     n = node_index(grid, index[0], index[1], index[2])
-    alpha = clock[0].damping
     mass = grid.node[n][3]
-    if mass == ZERO:
-        return
     owned = ghost_sides(boundary, grid.cells, index)
     free = free_components(boundary, grid.cells, index)
     total = grid.reprojected[n]
@@ -294,3 +283,25 @@ def solve_reprojected(
                     v = wp.cw_mul(s, velocity)
                     grid.reprojected[m] = vector4(v[0], v[1], v[2], heat)
     grid.reprojected[n] = vector4(velocity[0], velocity[1], velocity[2], heat)
+
+
+@wp.kernel(enable_backward=False)
+def solve_reprojected(
+    grid: Grid,
+    boundary: Boundary,
+    clock: wp.array(dtype=Clock),
+    impulses: wp.array(dtype=wp.float64),
+    slot: int,
+    begin: int,
+):
+    """Re-projected sums -> velocity v_r and the damping's heat H = alpha (sum w m v^2 / 2 / M - |v_r|^2 / 2) >= 0.
+
+    The blocks are those of the scatter at the end of the step before.
+    """
+    thread = wp.tid()
+    block = begin + thread // grid.workers
+    if is_active(grid, block, clock[0].step - 1):
+        for n in range(thread % grid.workers, NODES, grid.workers):
+            index = node_of_block(grid, block, n)
+            if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
+                solve_reprojected_node(grid, boundary, clock[0].damping, impulses, slot, index)

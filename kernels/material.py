@@ -328,7 +328,7 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         moved = ZERO
         if wp.static(move):
             step = wp.cw_div(dt * strained.motion, grid.spacing)
-            after = place(grid.cells, grid.active_lower, grid.active_upper, faces, cell, fraction, step)
+            after = place(grid.cells, faces, cell, fraction, step)
             moved = after.moved
             if after.fault:
                 wp.atomic_max(faults, slab, particles.index[p] + 1)

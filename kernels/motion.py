@@ -63,14 +63,12 @@ class Place:
     fraction: vector3
     moved: scalar  # its longest way along an axis [cells]
     left_through: int  # the open face through which it left, or -1
-    fault: bool  # it moved absurdly far, or out of the active cells
+    fault: bool  # it moved absurdly far, or its displacement is not a number
 
 
 @wp.func
 def place(
     cells: wp.vec3i,
-    active_lower: wp.vec3i,
-    active_upper: wp.vec3i,
     faces: Faces,
     old_cell: wp.vec3s,
     old_fraction: vector3,
@@ -78,8 +76,8 @@ def place(
 ) -> Place:
     """Move a particle by `displacement` [cells]; every particle's stencil is tested here, every step.
 
-    A mirror wall cannot be crossed but by round-off, which puts the particle back on the wall. A particle outside the
-    active cells, where its stencil would write outside the arrays, is a fault.
+    A particle that crosses an open face leaves. A mirror wall cannot be crossed but by round-off, which puts the
+    particle back on the wall. So a particle's cell is always one of the domain, and its stencil within the arrays.
     """
     result = Place()
     result.left_through = -1
@@ -111,9 +109,6 @@ def place(
         cell = wp.max(wp.min(cell, cells - wp.vec3i(1, 1, 1)), wp.vec3i(0, 0, 0))
     result.cell = cell
     result.fraction = fraction
-    inside = cell[0] >= active_lower[0] and cell[1] >= active_lower[1] and cell[2] >= active_lower[2]
-    inside = inside and cell[0] < active_upper[0] and cell[1] < active_upper[1] and cell[2] < active_upper[2]
-    result.fault = not inside
     return result
 
 
@@ -142,7 +137,7 @@ def move_kernel(shape: Shape) -> wp.Kernel:
         cell = particles.cell[p]
         fraction = particles.fraction[p]
         step = displacement(grid, cell, fraction, half_width, clock[0].dt)
-        after = place(grid.cells, grid.active_lower, grid.active_upper, faces, cell, fraction, step)
+        after = place(grid.cells, faces, cell, fraction, step)
         moved = Maxima()
         moved[DISPLACEMENT] = after.moved
         raise_maxima(maxima, slab, moved)

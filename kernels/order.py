@@ -65,16 +65,3 @@ def permute_kernel(dtype: Any) -> wp.Kernel:
         target[p] = source[order[p]]
 
     return permute
-
-
-@wp.kernel(enable_backward=False)
-def cell_bounds(particles: Particles, bounds: wp.array(dtype=int)):
-    """Lowest cell (bounds 0 to 2) and highest cell (3 to 5) that holds a particle, per axis."""
-    p = wp.tid()
-    if particles.mass[p] > ZERO:
-        cell = particles.cell[p]
-        for axis in range(3):
-            if int(cell[axis]) < bounds[axis]:
-                wp.atomic_min(bounds, axis, int(cell[axis]))
-            if int(cell[axis]) > bounds[3 + axis]:
-                wp.atomic_max(bounds, 3 + axis, int(cell[axis]))

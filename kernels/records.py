@@ -46,8 +46,9 @@ class Grid:
     stride_x: int  # flat index step of a node along x
     stride_y: int  # along y; along z it is 1
     spacing: vector3  # [m]
-    active_lower: wp.vec3i  # first cell in which particles may be
-    active_upper: wp.vec3i  # one past the last
+    stamps: wp.array(dtype=int)  # of each block: the step in which a particle last scattered there (see `blocks.py`)
+    blocks: wp.vec3i  # blocks of nodes per axis
+    workers: int  # threads that share a block: 1 on a CPU, all its nodes on a GPU
     light_mass: scalar  # nodes with less mass than this count as empty [kg]
 
 

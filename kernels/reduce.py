@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_mpm.kernels.grid import active_node
+from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import (
     BURN_SPEED,
@@ -148,8 +148,12 @@ def audit_particles(
 
 
 @wp.kernel(enable_backward=False)
-def audit_grid(grid: Grid, boundary: Boundary, sums: wp.array(dtype=wp.float64), slot: int, begin: int):
+def audit_grid(grid: Grid, boundary: Boundary, clock: wp.array(dtype=Clock), sums: wp.array(dtype=wp.float64)):
     """Sum the mass on the grid, in double."""
-    index = active_node(grid, begin + wp.tid())
-    if is_owner(boundary, grid.cells, index):
-        wp.atomic_add(sums, slot, wp.float64(grid.node[node_index(grid, index[0], index[1], index[2])][3]))
+    thread = wp.tid()
+    block = thread // grid.workers
+    if is_active(grid, block, clock[0].step):
+        for n in range(thread % grid.workers, NODES, grid.workers):
+            index = node_of_block(grid, block, n)
+            if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
+                wp.atomic_add(sums, 0, wp.float64(grid.node[node_index(grid, index[0], index[1], index[2])][3]))

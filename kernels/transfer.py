@@ -8,10 +8,25 @@ import functools
 
 import warp as wp
 
+from warp_mpm.kernels.blocks import stamp_block
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.vectors import multiply_add8, scatter_add4, scatter_add8
+
+
+@functools.cache
+def lowest_node_function(shape: Shape) -> wp.Function:
+    """Device function: index of the lowest node of a particle's stencil."""
+    offset = shape.offset
+
+    @wp.func
+    def lowest_node(cell: wp.vec3s, fraction: vector3) -> wp.vec3i:
+        return wp.vec3i(
+            int(cell[0]) + offset(fraction[0]), int(cell[1]) + offset(fraction[1]), int(cell[2]) + offset(fraction[2])
+        )
+
+    return lowest_node
 
 
 @functools.cache
@@ -25,12 +40,12 @@ def stencil_functions(shape: Shape) -> tuple[wp.Function, wp.Function, wp.Functi
     weights_type = wp.types.vector(width, scalar)
     offset, weight, slope, affine = shape.offset, shape.weight, shape.slope, shape.affine
 
+    lowest_node = lowest_node_function(shape)
+
     @wp.func
     def first_node(grid: Grid, cell: wp.vec3s, fraction: vector3) -> int:
-        i = int(cell[0]) + offset(fraction[0])
-        j = int(cell[1]) + offset(fraction[1])
-        k = int(cell[2]) + offset(fraction[2])
-        return node_index(grid, i, j, k)
+        lowest = lowest_node(cell, fraction)
+        return node_index(grid, lowest[0], lowest[1], lowest[2])
 
     @wp.func
     def weights(fraction: scalar, half_width: scalar) -> weights_type:
@@ -85,9 +100,17 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool) -> w
     width = shape.width
     first_node, weights, slopes, _ = stencil_functions(shape)
     node_offset = node_offset_function(shape)
+    lowest_node = lowest_node_function(shape)
 
     @wp.kernel(enable_backward=False, module="unique")
-    def scatter(particles: Particles, grid: Grid, half_width: scalar, ambient_pressure: scalar, begin: int):
+    def scatter(
+        particles: Particles,
+        grid: Grid,
+        clock: wp.array(dtype=Clock),
+        half_width: scalar,
+        ambient_pressure: scalar,
+        begin: int,
+    ):
         p = begin + wp.tid()
         fraction = particles.fraction[p]
         first = first_node(grid, particles.cell[p], fraction)
@@ -95,6 +118,10 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool) -> w
         wy = weights(fraction[1], half_width)
         wz = weights(fraction[2], half_width)
         mass = particles.mass[p]
+        if mass == ZERO:
+            return
+        lowest = lowest_node(particles.cell[p], fraction)
+        stamp_block(grid, lowest[0], lowest[1], lowest[2], clock[0].step)
         volume = mass / particles.density[p]
         carried = mass * particles.velocity[p]
         energy = particles.pressure[p] * volume

@@ -101,14 +101,21 @@ def image_sides(owned: wp.vec3i, i: int, j: int, k: int) -> wp.vec3i:
 
 
 @wp.func
-def image_node(grid: Grid, node: wp.vec3i, sides: wp.vec3i) -> int:
-    """Flat index of an image."""
+def image_index(grid: Grid, node: wp.vec3i, sides: wp.vec3i) -> wp.vec3i:
+    """Index of an image."""
     image = wp.vec3i(node[0], node[1], node[2])
     for axis in range(3):
         if sides[axis] == 0:
             image[axis] = -1
         if sides[axis] == 1:
             image[axis] = grid.cells[axis] + 1
+    return image
+
+
+@wp.func
+def image_node(grid: Grid, node: wp.vec3i, sides: wp.vec3i) -> int:
+    """Flat index of an image."""
+    image = image_index(grid, node, sides)
     return node_index(grid, image[0], image[1], image[2])
 
 

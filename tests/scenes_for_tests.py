@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import warp as wp
 
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.config import Order, SolverConfig, Transfer
@@ -13,6 +14,7 @@ from warp_mpm.conservation import Audit, totals_of
 from warp_mpm.detonators import Detonator, PointDetonator
 from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box
+from warp_mpm.kernels import transfer
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.materials import Material, ammonium_nitrate
@@ -125,6 +127,22 @@ def nodes(solver: Solver) -> np.ndarray:
     """Copy of all node values (nx + 3, ny + 3, nz + 3, 8), ghosts included: velocity, mass, acceleration, filling."""
     shape = tuple(n + 3 for n in solver.model.scene.domain.cells)
     return solver.state.grid.node.numpy().copy().reshape(*shape, 8)
+
+
+def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
+    """Scatter all particles onto an empty grid, without solving it.
+
+    Returns:
+        Node sums (nx + 3, ny + 3, nz + 3, 8), momentum, mass, force, volume, and sum w V p (nx + 3, ...), in double.
+    """
+    state, model = solver.state, solver.model
+    state.grid.node.zero_()
+    state.grid.pressure.zero_()
+    kernel = transfer.scatter_kernel(model.shape, True, True, model.affine)
+    inputs = [state.particles, state.grid, state.clock, model.charges[0].half_width, model.scene.ambient_pressure, 0]
+    wp.launch(kernel, state.count, inputs=inputs, device=state.device)
+    sums = nodes(solver).astype(np.float64)
+    return sums, state.grid.pressure.numpy().reshape(sums.shape[:3]).astype(np.float64)
 
 
 def particle_values(state: State) -> dict[str, np.ndarray]:

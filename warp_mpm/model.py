@@ -19,7 +19,6 @@ from warp_mpm.scene import Charge, Scene, Wall
 DEFAULT_BURN_WIDTH = 3.0  # cells
 SLAB_THICKNESS = 16  # cells; two slabs of one parity stay apart while particles drift by less than 7
 LARGEST_DRIFT = 6.0  # cells that a particle may move between two sortings
-ACTIVE_MARGIN = 8  # cells around the particles that are worked on; more than the drift and the stencil
 
 WALL_CODES = {Wall.OPEN: walls.WALL_OPEN, Wall.SLIP: walls.WALL_SLIP, Wall.STICK: walls.WALL_STICK}
 SHAPES = {

@@ -15,6 +15,7 @@ import warp as wp
 from warp_mpm.config import Order
 from warp_mpm.kernels import grid as grid_kernels
 from warp_mpm.kernels import material, motion, reduce, transfer
+from warp_mpm.kernels.blocks import NODES
 from warp_mpm.launch import Launcher, Task
 from warp_mpm.model import LARGEST_DRIFT, STRAINS, ChargeModel, Model
 from warp_mpm.state import State
@@ -81,8 +82,8 @@ class Solver:
             inputs = [state.particles, state.grid.spacing, energy, sums, slab, begin]
             wp.launch(reduce.audit_particles, count, inputs=inputs, device=model.device)
         grid_mass = wp.zeros(1, dtype=wp.float64, device=model.device)
-        inputs = [state.grid, model.boundary, grid_mass, 0, 0]
-        wp.launch(reduce.audit_grid, state.active_nodes, inputs=inputs, device=model.device)
+        inputs = [state.grid, model.boundary, state.clock, grid_mass]
+        wp.launch(reduce.audit_grid, state.blocks * state.grid.workers, inputs=inputs, device=model.device)
         return sums.numpy().reshape(model.slab_count, reduce.AUDIT).sum(axis=0), float(grid_mass.numpy()[0])
 
     def _initialise(self) -> None:
@@ -105,7 +106,7 @@ class Solver:
             state.pending_impulses.zero_()
 
     def _scatter(self, tasks: list[Task]) -> None:
-        """Empty the active nodes, and scatter onto them."""
+        """Empty the nodes that were scattered to, and scatter anew."""
         self._over_nodes(self._clear)
         self._over_slabs(tasks)
 
@@ -120,7 +121,7 @@ class Solver:
 
     def _over_nodes(self, tasks: list[Task]) -> None:
         """Work on nodes."""
-        self.launcher.run(tasks, self.state.active_nodes)
+        self.launcher.run(tasks, NODES * self.state.blocks)
 
     def _groups(self) -> Iterator[tuple[int, ChargeModel, int, int]]:
         """Slab, charge, first particle and number of particles of each group that has any."""
@@ -158,7 +159,7 @@ class Solver:
         def scatter(momentum: bool, force: bool) -> list[Task]:
             kernel = transfer.scatter_kernel(shape, momentum, force, model.affine)
             return self._per_slab(
-                lambda slab, charge: (kernel, [state.particles, state.grid, charge.half_width, ambient])
+                lambda slab, charge: (kernel, [state.particles, state.grid, state.clock, charge.half_width, ambient])
             )
 
         advance = transfer.advance_kernel(shape, blend, model.affine, musl)
@@ -198,9 +199,11 @@ class Solver:
         def solve(momentum: bool, force: bool) -> list[Task]:
             kernel = grid_kernels.solve_kernel(momentum, force)
             walls = [state.reactions, state.pending_impulses, state.peaks]
-            return self._per_slot(kernel, lambda slot: [state.grid, model.boundary, model.pic_share, *walls, slot])
+            return self._per_slot(
+                kernel, lambda slot: [state.grid, model.boundary, state.clock, model.pic_share, *walls, slot]
+            )
 
-        self._clear = self._per_slot(grid_kernels.clear, lambda slot: [state.grid])
+        self._clear = self._per_slot(grid_kernels.clear, lambda slot: [state.grid, state.clock])
         self._solve_all = solve(momentum=True, force=True)
         if model.config.order is Order.USF:
             self._solve_momentum = solve(momentum=True, force=False)
@@ -218,11 +221,11 @@ class Solver:
         return list(tasks)
 
     def _per_slot(self, kernel: wp.Kernel, inputs: Callable[[int], list[Any]]) -> list[Task]:
-        """The active nodes, cut into as many tasks as there are slots."""
-        total = self.state.active_nodes
+        """The blocks of nodes, cut into as many tasks as there are slots."""
+        total, workers = self.state.blocks, self.state.grid.workers
         edges = [total * slot // self.state.slots for slot in range(self.state.slots + 1)]
         return [
-            [self.launcher.record(kernel, end - begin, [*inputs(slot), begin])]
+            [self.launcher.record(kernel, (end - begin) * workers, [*inputs(slot), begin])]
             for slot, (begin, end) in enumerate(itertools.pairwise(edges))
             if end > begin
         ]

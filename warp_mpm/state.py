@@ -4,12 +4,14 @@ import numpy as np
 import warp as wp
 
 from warp_mpm.kernels import arrival, order
+from warp_mpm.kernels.blocks import EDGE, NODES
 from warp_mpm.kernels.precision import NEVER, matrix3, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import TALLIES, Clock, Grid, Maxima, Particles
 from warp_mpm.kernels.walls import REACTIONS
-from warp_mpm.model import ACTIVE_MARGIN, Model
+from warp_mpm.model import Model
 
 GRID_SLOTS = 8  # pieces into which the work on nodes is cut on a CPU
+NO_STEP = -2  # a stamp that no step has
 LIGHT = 1e-14  # of a particle's mass: nodes with less count as empty
 LAST_FRACTION = np.float32(0.99999994)  # the largest number below one in single precision
 
@@ -59,7 +61,7 @@ class State:
         self.ranges = self.sort()
 
     def sort(self) -> np.ndarray:
-        """Sort the particles by (slab, charge, cell), and fit the active cells around them.
+        """Sort the particles by (slab, charge, cell).
 
         Returns:
             (slabs, charges, 2) first particle and number of particles of each group.
@@ -85,14 +87,12 @@ class State:
         cells = int(np.prod(model.scene.domain.cells))
         wp.launch(order.group_starts, n + 1, inputs=[self._keys, n, wp.int64(cells), starts], device=self.device)
         first = starts.numpy()
-        self._fit_active_cells()
         return np.stack([first[:-1], np.diff(first)], axis=1).reshape(model.slab_count, len(model.charges), 2)
 
     @property
-    def active_nodes(self) -> int:
-        """Number of nodes that are worked on, ghosts included."""
-        lower, upper = np.array(self.grid.active_lower), np.array(self.grid.active_upper)
-        return int(np.prod(upper - lower + 3))
+    def blocks(self) -> int:
+        """Number of blocks of nodes."""
+        return len(self.grid.stamps)
 
     def clock_values(self) -> np.void:
         """The clock's fields, by name."""
@@ -140,26 +140,6 @@ class State:
                 )
             begin += count
 
-    def _fit_active_cells(self) -> None:
-        """Grow the active cells to hold all particles and what they may move until the next sorting; never shrink.
-
-        Shrinking would leave old values in nodes that nobody clears any more.
-        """
-        high = 2**30
-        bounds: wp.array = wp.array([high, high, high, -1, -1, -1], dtype=int, device=self.device)
-        wp.launch(order.cell_bounds, self.count, inputs=[self.particles, bounds], device=self.device)
-        values = bounds.numpy()
-        if values[3] < 0:
-            return
-        cells = np.array(self.model.scene.domain.cells)
-        lower = np.maximum(values[:3] - ACTIVE_MARGIN, 0)
-        upper = np.minimum(values[3:] + 1 + ACTIVE_MARGIN, cells)
-        if np.array(self.grid.active_upper).any():
-            lower = np.minimum(lower, np.array(self.grid.active_lower))
-            upper = np.maximum(upper, np.array(self.grid.active_upper))
-        self.grid.active_lower = wp.vec3i(*lower.tolist())
-        self.grid.active_upper = wp.vec3i(*upper.tolist())
-
 
 def memory_needed(model: Model) -> int:
     """Bytes that a state of this model takes on its device."""
@@ -177,6 +157,10 @@ def _allocate_grid(model: Model) -> Grid:
     grid.node = wp.zeros(total, dtype=vector8, device=model.device)
     grid.pressure = wp.zeros(total, dtype=scalar, device=model.device)
     grid.reprojected = wp.zeros(total, dtype=vector4, device=model.device)
+    blocks = [-(-n // EDGE) for n in counts]
+    grid.stamps = wp.full(blocks[0] * blocks[1] * blocks[2], NO_STEP, dtype=int, device=model.device)
+    grid.blocks = wp.vec3i(*blocks)
+    grid.workers = NODES if model.device.is_cuda else 1
     grid.cells = wp.vec3i(*cells)
     grid.stride_x = counts[1] * counts[2]
     grid.stride_y = counts[2]

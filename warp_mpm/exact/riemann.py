@@ -106,8 +106,8 @@ class RiemannProblem:
     Positions are arrays [m], times above 0 [s]. In a vacuum every field is 0, the velocity too.
 
     Raises:
-        ValueError: gamma is not above 1, a density or pressure is negative, one of them alone is 0 in a vacuum's
-            place, or both states are a vacuum.
+        ValueError: gamma is not above 1, a density or pressure is negative, a vacuum has a pressure, or both states
+            are a vacuum.
     """
 
     left: GasState
@@ -121,7 +121,7 @@ class RiemannProblem:
             raise ValueError(f"Riemann problem: gamma: expected a finite number above 1, got {self.gamma}")
         for state in (self.left, self.right):
             if state.density < 0.0 or state.pressure < 0.0 or (state.is_vacuum and state.pressure > 0.0):
-                raise ValueError(f"Riemann problem: expected a gas, or a vacuum with neither, got {state}")
+                raise ValueError(f"Riemann problem: expected a gas, or a vacuum without pressure, got {state}")
         if self.left.is_vacuum and self.right.is_vacuum:
             raise ValueError("Riemann problem: expected gas on one side at least, got two vacua")
 
@@ -254,8 +254,8 @@ class RiemannProblem:
         """Density behind the wave into a state, by the jump conditions or along the isentrope [kg/m3]."""
         gamma = self.gamma
         if pressure > state.pressure:
-            ahead, behind = (gamma - 1.0) * pressure, (gamma - 1.0) * state.pressure
-            return state.density * ((gamma + 1.0) * pressure + behind) / (ahead + (gamma + 1.0) * state.pressure)
+            rise = (gamma + 1.0) * pressure + (gamma - 1.0) * state.pressure
+            return state.density * rise / ((gamma - 1.0) * pressure + (gamma + 1.0) * state.pressure)
         return state.density * (pressure / state.pressure) ** (1.0 / gamma) if pressure > 0.0 else 0.0
 
     def _regions_of(self, state: GasState, sign: float) -> tuple[Region, ...]:

@@ -1,0 +1,174 @@
+"""What a run records: the field pressure by its formula, peaks, regions around the front path, and lines.
+
+The field pressure at a node is sum w V p / max(sum w V, V_i), V_i the node's share of the domain (DESIGN.md, section
+5); nodes less than half filled stay out of peaks.
+"""
+
+import numpy as np
+import pytest
+from scenes_for_tests import CELL, OPEN, ROUND_OFF, advance, block, nodes, scatter, start
+
+from warp_mpm import recorder as recorder_module
+from warp_mpm.builder import SceneBuilder
+from warp_mpm.detonators import PointDetonator
+from warp_mpm.geometry import Box
+from warp_mpm.materials import ammonium_nitrate
+from warp_mpm.recorder import Recorder, nodes_near_point, nodes_near_segment
+from warp_mpm.scene import Domain, Segment
+
+DOMAIN = Domain((-0.01, 0.0, 0.0), (0.09, 0.06, 0.02), (10, 4, 2))  # cells of 10 x 15 x 10 mm
+
+
+def node_volumes(cells):
+    """Each node's share of the domain (nx + 1, ny + 1, nz + 1), in cells: halved on every face."""
+    x, y, z = (np.where((np.arange(n + 1) == 0) | (np.arange(n + 1) == n), 0.5, 1.0) for n in cells)
+    return x[:, None, None] * y[:, None] * z
+
+
+def folded(sums):
+    """Node sums (nx + 3, ...) with ghosts behind walls on every face folded back onto the nodes inside."""
+    for axis in range(3):
+        sums = np.moveaxis(sums, axis, 0).copy()
+        sums[2] += sums[0]
+        sums[-3] += sums[-1]
+        sums = np.moveaxis(sums, 0, axis)
+    return sums[1:-1, 1:-1, 1:-1]
+
+
+@pytest.mark.parametrize("free", [False, True], ids=["closed", "free"])
+def test_field_pressure(free, device):
+    """The formula, from the sums of a scatter: ghosts folded in a closed box; nodes of a free block partly filled."""
+    scene = block((5, 4, 3), walls=OPEN, margin_cells=2) if free else block((5, 4, 3))
+    solver = advance(start(scene, device), 12)
+    state = solver.state
+    computed, filling = state.field_pressure().astype(np.float64), nodes(solver)[1:-1, 1:-1, 1:-1, 7]
+    peak = float(state.peaks.numpy().max())
+    sums, work = scatter(solver)
+    volume = sums[..., 7]
+    work, volume = (s[1:-1, 1:-1, 1:-1] if free else folded(s) for s in (work, volume))
+    share = node_volumes(scene.domain.cells) * CELL**3
+    expected = work / np.maximum(volume, share)
+    np.testing.assert_allclose(computed, expected, rtol=0, atol=32 * ROUND_OFF * expected.max())
+    np.testing.assert_allclose(filling, volume / share, rtol=0, atol=32 * ROUND_OFF * filling.max())
+    # Peaks of all steps so far, this one's among them.
+    assert peak >= computed[filling >= 0.5].max()
+    assert (filling.min() < 0.5) == free
+    assert filling.max() > 1.0
+
+
+def recorded_scene():
+    """A plate with a front path, two collision points and a line, in cells that are no cubes."""
+    builder = SceneBuilder("recorded")
+    builder.domain(DOMAIN.lower, DOMAIN.upper, cells=DOMAIN.cells)
+    builder.charge(Box((0.0, 0.0, 0.0), DOMAIN.upper), ammonium_nitrate())
+    builder.detonator(PointDetonator((0.0, 0.03, 0.01)))
+    builder.front_path((0.0, 0.03, 0.01), (0.05, 0.03, 0.01))
+    builder.line((-0.005, 0.01, 0.005), (0.085, 0.05, 0.015))
+    builder.collision_point((0.06, 0.04, 0.01))
+    builder.collision_point((0.0, 0.0, 0.0))
+    builder.end_time(1e-5)
+    return builder.build()
+
+
+def fill_grid(state, pressure, filling):
+    """Give the nodes of the domain (nx + 1, ny + 1, nz + 1) a field pressure and a filling; ghosts get far too much."""
+    shape = tuple(n + 3 for n in DOMAIN.cells)
+    pressures, values = np.full(shape, 1e12), np.zeros((*shape, 8))
+    inside = (slice(1, -1),) * 3
+    pressures[inside], values[(*inside, 7)] = pressure, filling
+    state.grid.pressure.assign(pressures.ravel().astype(np.float32))
+    state.grid.node.assign(values.reshape(-1, 8).astype(np.float32))
+
+
+def node_places():
+    axes = [low + size * np.arange(n + 1) for low, size, n in zip(*domain_parts(), strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+
+def domain_parts():
+    return DOMAIN.lower, DOMAIN.spacing, DOMAIN.cells
+
+
+def distances(segment_start, segment_end):
+    """Distance of each node from a segment, in cells."""
+    place = (node_places() - DOMAIN.lower) / DOMAIN.spacing
+    ends = [(np.array(end) - DOMAIN.lower) / DOMAIN.spacing for end in (segment_start, segment_end)]
+    along = np.linspace(0.0, 1.0, 2001)[:, None]
+    points = ends[0] + along * (ends[1] - ends[0])
+    return np.linalg.norm(place[..., None, :] - points, axis=-1).min(axis=-1)
+
+
+def test_regions_and_lines(device):
+    """Highest pressure within a cell of the path and two of each collision point; lines are interpolated linearly.
+
+    Nodes less than half filled do not count in regions. Distances are in cells, which differ per axis.
+    """
+    scene = recorded_scene()
+    solver = start(scene, device)
+    recorder = Recorder(solver.state)
+    random = np.random.default_rng(9)
+    pressure = random.uniform(0.0, 1e9, tuple(n + 1 for n in DOMAIN.cells))
+    filling = random.choice([0.0, 0.3, 0.5, 1.0], pressure.shape)
+    fill_grid(solver.state, pressure, filling)
+    recorder.record()
+    record = recorder.result()
+    counted = np.where(filling >= 0.5, pressure, 0.0)
+    path = distances((0.0, 0.03, 0.01), (0.05, 0.03, 0.01))
+    assert record.path_pressure[0] == np.float32(counted[path <= 1.0 + 1e-6].max())
+    for number, point in enumerate(scene.collision_points):
+        assert record.point_pressures[0, number] == np.float32(counted[distances(point, point) <= 2.0 + 1e-6].max())
+
+    place = node_places()
+    fill_grid(solver.state, 1e9 + place @ [1e9, 2e9, -3e9], np.zeros(pressure.shape))
+    advance_clock(solver.state)
+    recorder.record()
+    line = recorder.result().line
+    points = np.linspace(scene.line.start, scene.line.end, line.pressure.shape[1])
+    np.testing.assert_allclose(line.distance, np.linalg.norm(points - points[0], axis=1), atol=1e-12)
+    np.testing.assert_allclose(line.pressure[1], 1e9 + points @ [1e9, 2e9, -3e9], rtol=16 * ROUND_OFF)
+    assert np.diff(line.distance).max() <= 1.01 * min(DOMAIN.spacing)
+
+
+def advance_clock(state):
+    """Count a step, as `start_step` does."""
+    clock = state.clock.numpy().copy()
+    clock["step"] += 1
+    state.clock.assign(clock)
+
+
+@pytest.mark.parametrize("reach", [1.0, 2.0])
+@pytest.mark.parametrize("end", [(0.05, 0.03, 0.01), (0.02, 0.06, 0.0), (0.0, 0.03, 0.01)])
+def test_nodes_near_a_segment(end, reach):
+    """The nodes of a region are those that a brute-force search finds; a segment may be a point."""
+    begin = (0.0, 0.03, 0.01)
+    near = distances(begin, end) <= reach + 1e-6
+    found = (
+        nodes_near_point(DOMAIN, begin, reach)
+        if begin == end
+        else nodes_near_segment(DOMAIN, Segment(begin, end), reach)
+    )
+    assert {tuple(node) for node in found} == {tuple(node) for node in np.argwhere(near)}
+
+
+def test_records_survive_many_steps(device, monkeypatch):
+    """Rows are fetched in chunks: here of 7 steps, in a run of 30; every step has its row, in order."""
+    monkeypatch.setattr(recorder_module, "CHUNK", 7)
+    solver = start(block((6, 4, 3)), device)
+    recorder = Recorder(solver.state)
+    recorder.record()
+    clocks, taken = [(0.0, 0.0)], []
+    for _ in range(30):
+        advance(solver, 1)
+        recorder.record()
+        values = solver.state.clock_values()
+        clocks.append((float(values["time"]), float(values["dt"])))
+        if len(clocks) % 10 == 0:
+            taken.append(recorder.take_peak())
+    record = recorder.result()
+    np.testing.assert_array_equal(record.time, [time for time, _ in clocks])
+    np.testing.assert_array_equal(record.dt, np.float32([dt for _, dt in clocks]))
+    peaks = record.field_pressure
+    assert taken == [peaks[:10].max(), peaks[10:20].max(), peaks[20:30].max()]
+    assert record.path_pressure is None
+    assert record.line is None
+    assert record.particle_pressure.max() > 0.0

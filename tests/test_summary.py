@@ -1,0 +1,119 @@
+"""The figures of a run from records made up for the purpose: a front of known speed, height and place."""
+
+import math
+
+import numpy as np
+import pytest
+from scenes_for_tests import explosive
+
+from warp_mpm.builder import SceneBuilder
+from warp_mpm.detonators import PlaneDetonator, PointDetonator
+from warp_mpm.geometry import Box
+from warp_mpm.output.frame import LineRecord
+from warp_mpm.recorder import StepRecord
+from warp_mpm.scene import Segment
+from warp_mpm.summary import arrival_times, figures_of_merit, ideal_arrival, lit_explosive
+
+SPEED = 2800.0
+DELAY = 2e-6  # [s] of the right detonator
+LENGTH = 0.2  # [m]
+MET = LENGTH / 2 + SPEED * DELAY / 2  # where the two fronts meet
+
+
+def bar():
+    """A bar lit at both ends, the right one a little later."""
+    builder = SceneBuilder("bar")
+    box = Box((0.0, 0.0, 0.0), (LENGTH, 0.01, 0.01))
+    builder.domain(box.lower, box.upper, cell_size=0.005)
+    builder.charge(box, explosive(), name="bar")
+    builder.detonator(PointDetonator((0.0, 0.005, 0.005)))
+    builder.detonator(PointDetonator((LENGTH, 0.005, 0.005), time=DELAY))
+    builder.front_path((0.0, 0.005, 0.005), (MET, 0.005, 0.005))
+    builder.line((0.0, 0.005, 0.005), (LENGTH, 0.005, 0.005))
+    builder.collision_point((MET, 0.005, 0.005))
+    builder.end_time(MET / SPEED)
+    return builder.build()
+
+
+def front_record(scene, speed, lag, height):
+    """A record in which fronts of a speed, `lag` behind the ideal one, rise linearly over three steps to a height."""
+    time = np.linspace(0.0, MET / SPEED, 400)
+    rise = 3 * time[1]
+
+    def along(segment, count):
+        distance = np.linspace(0.0, segment.length, count)
+        arrival = np.minimum(distance / speed, DELAY + (LENGTH - distance) / speed) + lag / speed
+        return LineRecord(time, distance, height * np.clip((time[:, None] - arrival) / rise, 0.0, 1.0))
+
+    path, line = along(scene.front_path, 42), along(scene.line, 41)
+    return StepRecord(
+        time=time,
+        dt=np.full(400, time[1]),
+        particle_pressure=np.full(400, 1.5 * height),
+        field_pressure=line.pressure.max(axis=1),
+        path_pressure=np.linspace(0.0, height, 400),
+        point_pressures=np.linspace(0.0, 2.4 * height, 400)[:, None],
+        path=path,
+        line=line,
+    )
+
+
+def test_figures_of_a_known_front():
+    """Speed, offset and residual of the fit, pressures, and where the fronts met: as they were put in."""
+    scene = bar()
+    speed, lag, height = 2790.0, 1e-3, 2e9
+    figures = figures_of_merit(scene, front_record(scene, speed, lag, height))
+    assert figures["p_cj_pa"] == pytest.approx(2.6133e9, rel=1e-4)
+    assert figures["front_speed_m_s"] == pytest.approx(speed, rel=1e-6)
+    assert figures["front_fit_residual_m"] == pytest.approx(0.0, abs=1e-6)
+    # At 5 % of p_CJ: a little later than the foot of the rise. The slower wave falls behind over the fitted part.
+    threshold = 0.05 * figures["p_cj_pa"] / height * 3 * MET / SPEED / 399 * SPEED
+    middle = 0.55 * MET
+    assert figures["front_offset_m"] == pytest.approx(-(lag + threshold + middle * (1.0 - speed / SPEED)), rel=0.05)
+    assert figures["front_pressure_pa"] == pytest.approx(0.7 * height, rel=0.01)  # half-way from 50 to 90 %
+    assert figures["collision_pressures_pa"] == [pytest.approx(2.4 * height)]
+    assert figures["collision_pressure_pa"] == pytest.approx(2.4 * height)
+    assert figures["peak_pressure_pa"] == pytest.approx(height)
+    assert figures["max_particle_pressure_pa"] == pytest.approx(1.5 * height)
+    assert figures["collision_positions_m"] == [pytest.approx(LENGTH / 2 + speed * DELAY / 2, abs=1e-6)]
+
+
+def test_arrivals_are_interpolated_in_time():
+    """Half-way between two records if the threshold is half-way between their pressures; never if it is not met."""
+    pressure = np.array([[0.0, 5.0, 0.0], [0.0, 5.0, 0.0], [2.0, 5.0, 0.5]])
+    record = LineRecord(np.array([0.0, 1.0, 2.0]), np.arange(3.0), pressure)
+    np.testing.assert_allclose(arrival_times(record, 1.0), [1.5, 0.0, math.nan])
+
+
+def test_ideal_arrival():
+    """The delayed minimum over points and planes, as in `test_arrival.py`, for places on the front path."""
+    scene = bar()
+    points = Segment((0.0, 0.005, 0.005), (LENGTH, 0.005, 0.005)).points(21)
+    expected = np.minimum(points[:, 0] / SPEED, DELAY + (LENGTH - points[:, 0]) / SPEED)
+    np.testing.assert_allclose(ideal_arrival(scene, points, SPEED), expected, rtol=1e-12, atol=1e-18)
+    plane = SceneBuilder("plane")
+    plane.domain((0.0, 0.0, 0.0), (0.1, 0.1, 0.1), cell_size=0.02)
+    plane.charge(Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)), explosive())
+    plane.detonator(PlaneDetonator((0.0, 0.0, 0.0), (0.0, 2.0, 0.0), time=1e-6))
+    plane.end_time(1e-5)
+    arrival = ideal_arrival(plane.build(), np.array([[0.05, 0.07, 0.01]]), SPEED)
+    assert arrival[0] == pytest.approx(1e-6 + 0.07 / SPEED)
+
+
+def test_what_does_not_apply_is_none():
+    """Without front path, line and collision points there are no such figures; before it has run far, no speed."""
+    builder = SceneBuilder("plain")
+    builder.domain((0.0, 0.0, 0.0), (0.1, 0.1, 0.1), cell_size=0.02)
+    builder.charge(Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)), explosive(), name="block")
+    builder.detonator(PointDetonator((0.0, 0.0, 0.0)))
+    builder.end_time(1e-5)
+    scene = builder.build()
+    ones = np.ones(3)
+    record = StepRecord(ones, ones, ones, ones, None, np.zeros((3, 0)), None, None)
+    figures = figures_of_merit(scene, record)
+    assert figures["collision_pressures_pa"] == []
+    for name in ("front_pressure_pa", "front_speed_m_s", "front_offset_m", "collision_pressure_pa"):
+        assert figures[name] is None
+    assert lit_explosive(scene) is scene.charges[0].material
+    nothing_yet = front_record(bar(), SPEED, 2 * LENGTH, 2e9)
+    assert figures_of_merit(bar(), nothing_yet)["front_speed_m_s"] is None
