@@ -1,9 +1,7 @@
 """Blocks of 4 x 4 x 4 nodes: the grid's work is done only where particles are.
 
-The scatter stamps the block of each particle's lowest stencil node with the number of the step. A stencil is three
-nodes wide, so it reaches into that block and the next one along each axis: a block is active in a step if it, or one
-of its lower neighbors, carries that step's stamp. Stamps need no clearing. Nodes are numbered in blocks from the
-lowest ghost on.
+The scatter stamps the blocks that a particle's stencil reaches with the number of the step; a block is active in a
+step if it carries that step's stamp. Stamps need no clearing. Nodes are numbered in blocks from the lowest ghost on.
 """
 
 import warp as wp
@@ -11,37 +9,29 @@ import warp as wp
 from warp_mpm.kernels.records import Grid
 
 EDGE = wp.constant(4)
+GHOST_REACH = wp.constant(2)  # nodes from one next to a wall to its ghost behind the wall
 NODES = wp.constant(64)  # of a block
 
 
 @wp.func
-def block_index(grid: Grid, i: int, j: int, k: int) -> int:
-    """Flat index of the block that holds node (i, j, k)."""
-    return (((i + 1) // EDGE) * grid.blocks[1] + (j + 1) // EDGE) * grid.blocks[2] + (k + 1) // EDGE
+def last_block(blocks: int, lowest: int, width: int) -> int:
+    """Last block along an axis that a stencil reaches, and the ghost that its last node may own, two nodes further."""
+    return wp.min((lowest + 1 + width - 1 + GHOST_REACH) // EDGE, blocks - 1)
 
 
 @wp.func
-def stamp_block(grid: Grid, i: int, j: int, k: int, step: int):
-    """Say that the stencil with lowest node (i, j, k) was scattered to in a step."""
-    grid.stamps[block_index(grid, i, j, k)] = step
+def stamp_blocks(grid: Grid, lowest: wp.vec3i, width: int, step: int):
+    """Say that a stencil of `width` nodes per axis, the lowest given, was scattered to in a step."""
+    for i in range((lowest[0] + 1) // EDGE, last_block(grid.blocks[0], lowest[0], width) + 1):
+        for j in range((lowest[1] + 1) // EDGE, last_block(grid.blocks[1], lowest[1], width) + 1):
+            for k in range((lowest[2] + 1) // EDGE, last_block(grid.blocks[2], lowest[2], width) + 1):
+                grid.stamps[(i * grid.blocks[1] + j) * grid.blocks[2] + k] = step
 
 
 @wp.func
 def is_active(grid: Grid, block: int, step: int) -> bool:
     """Whether anything was scattered to a block in a step."""
-    if grid.stamps[block] == step:
-        return True
-    row = block // grid.blocks[2]
-    lower_x = wp.where(row // grid.blocks[1] > 0, 2, 1)
-    lower_y = wp.where(row % grid.blocks[1] > 0, 2, 1)
-    lower_z = wp.where(block % grid.blocks[2] > 0, 2, 1)
-    active = bool(False)
-    for i in range(lower_x):
-        for j in range(lower_y):
-            for k in range(lower_z):
-                neighbor = block - (i * grid.blocks[1] + j) * grid.blocks[2] - k
-                active = active or grid.stamps[neighbor] == step
-    return active
+    return grid.stamps[block] == step
 
 
 @wp.func

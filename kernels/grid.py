@@ -8,7 +8,7 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid, stamp_block
+from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index, raise_maximum
 from warp_mpm.kernels.walls import (
@@ -16,7 +16,6 @@ from warp_mpm.kernels.walls import (
     free_components,
     ghost_sides,
     image_count,
-    image_index,
     image_node,
     image_sides,
     image_signs,
@@ -134,9 +133,8 @@ def mirror(
     acceleration: vector3,
     filling: scalar,
     pressure: scalar,
-    step: int,
 ):
-    """Write a node's values into its ghosts, and stamp their blocks, so that they are cleared like the others."""
+    """Write a node's values into its ghosts; their blocks are stamped with the stencil's, so they are cleared too."""
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
@@ -148,8 +146,6 @@ def mirror(
                     a = wp.cw_mul(s, acceleration)
                     grid.node[m] = vector8(v[0], v[1], v[2], grid.node[m][3], a[0], a[1], a[2], filling)
                     grid.pressure[m] = pressure
-                    ghost = image_index(grid, index, sides)
-                    stamp_block(grid, ghost[0], ghost[1], ghost[2], step)
 
 
 @functools.cache
@@ -171,7 +167,6 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
         impulses: wp.array(dtype=wp.float64),
         peaks: wp.array(dtype=scalar),
         slot: int,
-        step: int,
         index: wp.vec3i,
     ):
         n = node_index(grid, index[0], index[1], index[2])
@@ -208,7 +203,7 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
                 tally_walls(grid, boundary, index, owned, True, mass, ONE, acceleration, reactions, slot)
             if wp.static(momentum) and pic_share > ZERO:
                 tally_walls(grid, boundary, index, owned, False, mass, pic_share, velocity, impulses, slot)
-            mirror(grid, boundary, index, owned, velocity, acceleration, filling, pressure, step)
+            mirror(grid, boundary, index, owned, velocity, acceleration, filling, pressure)
         grid.node[n] = vector8(
             velocity[0], velocity[1], velocity[2], mass, acceleration[0], acceleration[1], acceleration[2], filling
         )
@@ -228,12 +223,11 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
     ):
         thread = wp.tid()
         block = begin + thread // grid.workers
-        step = clock[0].step
-        if is_active(grid, block, step):
+        if is_active(grid, block, clock[0].step):
             for n in range(thread % grid.workers, NODES, grid.workers):
                 index = node_of_block(grid, block, n)
                 if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
-                    solve_node(grid, boundary, pic_share, reactions, impulses, peaks, slot, step, index)
+                    solve_node(grid, boundary, pic_share, reactions, impulses, peaks, slot, index)
 
     return solve
 

@@ -8,7 +8,7 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.blocks import stamp_block
+from warp_mpm.kernels.blocks import stamp_blocks
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
@@ -120,8 +120,7 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool) -> w
         mass = particles.mass[p]
         if mass == ZERO:
             return
-        lowest = lowest_node(particles.cell[p], fraction)
-        stamp_block(grid, lowest[0], lowest[1], lowest[2], clock[0].step)
+        stamp_blocks(grid, lowest_node(particles.cell[p], fraction), width, clock[0].step)
         volume = mass / particles.density[p]
         carried = mass * particles.velocity[p]
         energy = particles.pressure[p] * volume

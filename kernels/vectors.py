@@ -23,7 +23,7 @@ def _multiply_add(lanes: int) -> str:
     __builtin_memcpy(&result, &sum, sizeof(sum));
     return result;
 #else
-    return total + weight * value;
+    return wp::add(total, wp::mul(value, weight));
 #endif
 """
 
@@ -38,7 +38,7 @@ def _scatter_add(lanes: int) -> str:
     sum += weight * addend;
     __builtin_memcpy(nodes.data + index, &sum, sizeof(sum));
 #else
-    wp::atomic_add(nodes, index, weight * value);
+    wp::atomic_add(nodes, index, wp::mul(value, weight));
 #endif
 """
 

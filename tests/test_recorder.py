@@ -53,7 +53,7 @@ def test_field_pressure(free, device):
     # Peaks of all steps so far, this one's among them.
     assert peak >= computed[filling >= 0.5].max()
     assert (filling.min() < 0.5) == free
-    assert filling.max() > 1.0
+    assert (filling.max() > 1.0) != free
 
 
 def recorded_scene():
@@ -109,6 +109,7 @@ def test_regions_and_lines(device):
     random = np.random.default_rng(9)
     pressure = random.uniform(0.0, 1e9, tuple(n + 1 for n in DOMAIN.cells))
     filling = random.choice([0.0, 0.3, 0.5, 1.0], pressure.shape)
+    pressure[filling < 0.5] += 1e9  # what must not count would be the highest
     fill_grid(solver.state, pressure, filling)
     recorder.record()
     record = recorder.result()

@@ -59,23 +59,30 @@ def front_record(scene, speed, lag, height):
 
 
 def test_figures_of_a_known_front():
-    """Speed, offset and residual of the fit, pressures, and where the fronts met: as they were put in."""
+    """Speed, offset and residual of the fit, pressures, and where the fronts met: as they were put in.
+
+    An arrival is interpolated between two records, and the foot of the rise lies between them: it is off by up to a
+    quarter of the way the front runs in that time.
+    """
     scene = bar()
     speed, lag, height = 2790.0, 1e-3, 2e9
     figures = figures_of_merit(scene, front_record(scene, speed, lag, height))
     assert figures["p_cj_pa"] == pytest.approx(2.6133e9, rel=1e-4)
-    assert figures["front_speed_m_s"] == pytest.approx(speed, rel=1e-6)
-    assert figures["front_fit_residual_m"] == pytest.approx(0.0, abs=1e-6)
+    way = MET / 399
+    assert figures["front_speed_m_s"] == pytest.approx(speed, rel=0.25 * way / MET)
+    assert figures["front_fit_residual_m"] < 0.25 * way
     # At 5 % of p_CJ: a little later than the foot of the rise. The slower wave falls behind over the fitted part.
-    threshold = 0.05 * figures["p_cj_pa"] / height * 3 * MET / SPEED / 399 * SPEED
+    threshold = 0.05 * figures["p_cj_pa"] / height * 3 * way
     middle = 0.55 * MET
-    assert figures["front_offset_m"] == pytest.approx(-(lag + threshold + middle * (1.0 - speed / SPEED)), rel=0.05)
+    assert figures["front_offset_m"] == pytest.approx(
+        -(lag + threshold + middle * (1.0 - speed / SPEED)), abs=0.25 * way
+    )
     assert figures["front_pressure_pa"] == pytest.approx(0.7 * height, rel=0.01)  # half-way from 50 to 90 %
     assert figures["collision_pressures_pa"] == [pytest.approx(2.4 * height)]
     assert figures["collision_pressure_pa"] == pytest.approx(2.4 * height)
     assert figures["peak_pressure_pa"] == pytest.approx(height)
     assert figures["max_particle_pressure_pa"] == pytest.approx(1.5 * height)
-    assert figures["collision_positions_m"] == [pytest.approx(LENGTH / 2 + speed * DELAY / 2, abs=1e-6)]
+    assert figures["collision_positions_m"] == [pytest.approx(LENGTH / 2 + speed * DELAY / 2, abs=0.25 * way)]
 
 
 def test_arrivals_are_interpolated_in_time():

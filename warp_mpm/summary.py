@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warp_mpm.detonators import PlaneDetonator
+from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.materials import Material
 from warp_mpm.output.frame import LineRecord
 from warp_mpm.recorder import StepRecord
@@ -36,16 +36,8 @@ def lit_explosive(scene: Scene) -> Material | None:
 
 
 def ideal_arrival(scene: Scene, points: np.ndarray, speed: float) -> np.ndarray:
-    """Arrival times (n,) [s] of straight waves at points (n, 3): min over detonators of t_i + distance / D."""
-    arrival = np.full(len(points), np.inf)
-    for detonator in scene.detonators:
-        away = points - np.array(detonator.position)
-        if isinstance(detonator, PlaneDetonator):
-            distance = np.abs(away @ np.array(detonator.normal)) / np.linalg.norm(detonator.normal)
-        else:
-            distance = np.linalg.norm(away, axis=1)
-        arrival = np.minimum(arrival, detonator.time + distance / speed)
-    return arrival
+    """Arrival times (n,) [s] of straight waves from the scene's detonators at points (n, 3)."""
+    return straight_arrival(scene.detonators, points, speed)
 
 
 def arrival_times(record: LineRecord, threshold: float) -> np.ndarray:

@@ -99,3 +99,29 @@ def energy_for_speed(eos: EquationOfState, initial_density: float, detonation_sp
         if abs(ratio - 1.0) < 5e-7:
             return energy
     raise ValueError(f"{eos}: expected an energy that gives {detonation_speed:g} m/s, found none")
+
+
+def ideal_gas_state(gamma: float, initial_density: float, detonation_speed: float) -> ChapmanJouguetState:
+    """The Chapman-Jouguet state of gamma-law products in closed form, for a density [kg/m3] and a speed D [m/s].
+
+    Raises:
+        ValueError: gamma is not above 1, or density or speed is not positive.
+    """
+    if not 1.0 < gamma < math.inf:
+        raise ValueError(f"gamma-law products: gamma: expected a finite number above 1, got {gamma}")
+    for name, value in (("initial density", initial_density), ("detonation speed", detonation_speed)):
+        if not 0.0 < value < math.inf:
+            raise ValueError(f"gamma-law products: {name}: expected a positive number, got {value}")
+    velocity = detonation_speed / (gamma + 1.0)
+    return ChapmanJouguetState(
+        detonation_speed=detonation_speed,
+        pressure=initial_density * detonation_speed * velocity,
+        density=initial_density * (gamma + 1.0) / gamma,
+        particle_velocity=velocity,
+        sound_speed=detonation_speed - velocity,
+    )
+
+
+def ideal_gas_energy(gamma: float, detonation_speed: float) -> float:
+    """Specific energy E0 [J/kg] with which gamma-law products detonate at the speed D [m/s]."""
+    return detonation_speed**2 / (2.0 * (gamma**2 - 1.0))

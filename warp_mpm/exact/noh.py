@@ -44,12 +44,12 @@ class NohImplosion:
     def __post_init__(self) -> None:
         """Check the parameters."""
         if self.dimensions not in (1, 2, 3):
-            raise ValueError(f"Noh: dimensions: expected 1, 2 or 3, got {self.dimensions}")
+            raise ValueError(f"NohImplosion: dimensions: expected 1, 2 or 3, got {self.dimensions}")
         if not 1.0 < self.gamma < math.inf:
-            raise ValueError(f"Noh: gamma: expected a finite number above 1, got {self.gamma}")
+            raise ValueError(f"NohImplosion: gamma: expected a finite number above 1, got {self.gamma}")
         for name in ("initial_density", "speed", "outer_radius"):
             if not getattr(self, name) > 0.0:
-                raise ValueError(f"Noh: {name}: expected a positive number, got {getattr(self, name)}")
+                raise ValueError(f"NohImplosion: {name}: expected a positive number, got {getattr(self, name)}")
 
     @property
     def shock_speed(self) -> float:
@@ -108,8 +108,8 @@ class NohImplosion:
         k = self.dimensions
         shock, edge = self.shock_radius(time), self.edge_radius(time)
         behind = self.plateau_density * np.minimum(edges, shock) ** k
-        start = shock + self.speed * time  # where the gas that the shock meets now was at t = 0
-        ahead = self.initial_density * ((np.clip(edges, shock, edge) + self.speed * time) ** k - start**k)
+        # Where the gas was at t = 0, it had the volume to which its mass is proportional.
+        ahead = self.initial_density * (np.clip(edges, shock, edge) + self.speed * time) ** k
         return np.diff(behind + ahead) / np.diff(np.asarray(edges, dtype=float) ** k)
 
     def mean_velocity(self, edges: np.ndarray, time: float) -> np.ndarray:

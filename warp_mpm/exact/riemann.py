@@ -118,12 +118,12 @@ class RiemannProblem:
     def __post_init__(self) -> None:
         """Check the states."""
         if not 1.0 < self.gamma < math.inf:
-            raise ValueError(f"Riemann problem: gamma: expected a finite number above 1, got {self.gamma}")
+            raise ValueError(f"RiemannProblem: gamma: expected a finite number above 1, got {self.gamma}")
         for state in (self.left, self.right):
             if state.density < 0.0 or state.pressure < 0.0 or (state.is_vacuum and state.pressure > 0.0):
-                raise ValueError(f"Riemann problem: expected a gas, or a vacuum without pressure, got {state}")
+                raise ValueError(f"RiemannProblem: expected a gas, or a vacuum without pressure, got {state}")
         if self.left.is_vacuum and self.right.is_vacuum:
-            raise ValueError("Riemann problem: expected gas on one side at least, got two vacua")
+            raise ValueError("RiemannProblem: expected gas on one side at least, got two vacua")
 
     @property
     def has_vacuum(self) -> bool:
@@ -138,7 +138,7 @@ class RiemannProblem:
             ValueError: there is a vacuum in its place.
         """
         if self.has_vacuum:
-            raise ValueError("Riemann problem: expected a star state, got a vacuum between the gases")
+            raise ValueError("RiemannProblem: expected a star state, got a vacuum between the gases")
         pressure = self._star_pressure()
         right, left = (wave_strength(state, self.gamma, pressure)[0] for state in (self.right, self.left))
         velocity = 0.5 * (self.left.velocity + self.right.velocity + right - left)
@@ -243,7 +243,7 @@ class RiemannProblem:
             value, slope = excess(pressure)
             low, high = (pressure, high) if value < 0.0 else (low, pressure)
             following = pressure - value / slope
-            if not low <= following <= high:
+            if following <= 0.0 or not low <= following <= high:
                 following = 0.5 * (low + high)
             if abs(following - pressure) <= CONVERGED * following:
                 break

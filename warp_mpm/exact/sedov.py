@@ -17,9 +17,9 @@ form (subscript s: behind the shock):
     n1 = -(13 gamma^2 - 7 gamma + 12) / ((3 gamma - 1) (2 gamma + 1)),  n2 = 5 (gamma - 1) / (2 gamma + 1),
     n3 = 3 / (2 gamma + 1),  n4 = -n1 / (2 - gamma),  n5 = -2 / (2 - gamma).
 
-For gamma = 2 the last two are infinite; A^n4 C^n5 then is its limit. A vacuum forms inside from gamma = 7 on. The mass
-within x R is x^3 (rho / rho0) (1 - V) of that within the shock, as mass leaves x R only as fast as R grows. The energy
-gives xi0: E = alpha rho0 R^5 / t^2 with alpha = xi0^-5 = 16 pi / 25 times the integral over x of
+For gamma = 2 the last two are infinite; A^n4 C^n5 then is its limit. From gamma = 7 on the center is a vacuum. The mass
+within x R grows as R^3, at the rate 4 pi r^2 rho (x R' - u), so it is x^3 (rho / rho0) (1 - V) of that within the
+shock. The energy gives xi0: E = alpha rho0 R^5 / t^2 with alpha = xi0^-5 = 16 pi / 25 times the integral over x of
 x^2 (rho u^2 / 2 + p / (gamma - 1)) / (rho0 R'^2). For gamma = 1.4, alpha = 0.851072 and xi0 = 1.0328; for gamma = 5/3,
 0.493590 and 1.1517.
 
@@ -60,10 +60,10 @@ class SedovBlast:
     def __post_init__(self) -> None:
         """Check the parameters."""
         if not 1.0 < self.gamma < 7.0:
-            raise ValueError(f"Sedov: gamma: expected a number above 1 and below 7, got {self.gamma}")
+            raise ValueError(f"SedovBlast: gamma: expected a number above 1 and below 7, got {self.gamma}")
         for name in ("blast_energy", "initial_density"):
             if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"Sedov: {name}: expected a positive number, got {getattr(self, name)}")
+                raise ValueError(f"SedovBlast: {name}: expected a positive number, got {getattr(self, name)}")
 
     @cached_property
     def alpha(self) -> float:

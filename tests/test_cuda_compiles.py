@@ -1,0 +1,28 @@
+"""The kernels of the default solver compile for CUDA, which needs no GPU: Warp brings NVIDIA's run-time compiler."""
+
+import pytest
+import warp as wp
+
+from warp_mpm.kernels import grid, material, reduce, shape, transfer
+from warp_mpm.kernels.burn.programmed import ProgrammedBurn
+from warp_mpm.kernels.eos.ideal_gas import IdealGas
+
+ARCHITECTURE = 75  # the oldest that current Warp supports
+
+KERNELS = {
+    "scatter": lambda: transfer.scatter_kernel(shape.BSPLINE, True, True, False),
+    "advance": lambda: transfer.advance_kernel(shape.BSPLINE, False, False, True),
+    "update": lambda: material.update_kernel(
+        shape.BSPLINE, material.Strain.REPROJECTED, True, True, IdealGas, ProgrammedBurn
+    ),
+    "solve": lambda: grid.solve_kernel(True, True),
+    "solve_reprojected": lambda: grid.solve_reprojected,
+    "start_step": lambda: reduce.start_step,
+}
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_kernel_compiles_for_cuda(name, tmp_path):
+    wp.compile_aot_module(KERNELS[name]().module, arch=ARCHITECTURE, module_dir=str(tmp_path), use_ptx=True)
+    (ptx,) = tmp_path.glob("*.ptx")
+    assert ".visible .entry" in ptx.read_text()

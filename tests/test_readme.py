@@ -1,0 +1,44 @@
+"""The README keeps its word: its commands are those that CI runs, its script runs, its links lead somewhere."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language):
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_two_commands_set_up_everything():
+    first, second = blocks("bash")
+    assert README.index(first) < README.index(second) < README.index("\n## ")
+    assert first.count("\n") == second.count("\n") == 1
+    assert first.endswith(" && .venv/bin/warp-mpm run two_point -o out/two_point\n")
+    assert second in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_the_script_runs(tmp_path):
+    (script,) = blocks("python")
+    (tmp_path / "script.py").write_text(script, encoding="utf-8")
+    ended = subprocess.run(
+        [sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert re.fullmatch(r"p_CJ 19\.6 GPa, peak 1\d\.\d GPa\n", ended.stdout)
+    assert (tmp_path / "out" / "ball" / "ball.usdc").exists()
+
+
+def test_links_lead_somewhere():
+    targets = re.findall(r"\]\((?!https?:|#)([^)]+)\)", README)
+    assert "docs/pictures/two_point.png" in targets
+    assert [target for target in targets if not (ROOT / target).exists()] == []
+
+
+def test_headings_that_are_linked_exist():
+    headings = {heading.lower().replace(" ", "-") for heading in re.findall(r"^#+ (.*)$", README, flags=re.MULTILINE)}
+    anchors = re.findall(r"\]\(#([^)]+)\)", README)
+    assert set(anchors) <= headings
