@@ -28,6 +28,7 @@ from warp_mpm.summary import figures_of_merit, lit_explosive
 from warp_mpm.version import VERSION
 
 GROWTH = 1.1  # of the time step, at most; as in kernels.reduce
+STEPS_BETWEEN_AUDITS = 100  # at most: errors are looked for between frames too, however few there are
 STEPS_AT_ONCE = 4  # on a GPU, so that the drift between two looks at it stays below a cell or two
 
 
@@ -110,6 +111,7 @@ class _Run:
         self.pictures: list[SectionPicture] = []
         self.solver_seconds = 0.0
         self.steps = 0
+        self.audited_step = 0
 
     def to_the_end(self) -> None:
         """Step to the end time; save frames and pictures at the first step at or past their instants."""
@@ -153,6 +155,8 @@ class _Run:
         clock = self.state.clock_values()
         check_faults(self.state, self.steps)
         self.solver.sort_if_due()
+        if self.steps - self.audited_step >= STEPS_BETWEEN_AUDITS:
+            self._audit()
         self.solver_seconds += time.perf_counter() - begin
         return float(clock["time"])
 
@@ -172,8 +176,7 @@ class _Run:
             pictures.pop(0)
             self.pictures.append(SectionPicture(now, section_pressure(self.state)))
         if next_frame < len(frames) and now >= frames[next_frame]:
-            totals = totals_of(self.solver)
-            self.audit.add(totals)
+            totals = self._audit()
             pressure = self.state.field("pressure")
             inside = self.state.field("mass") > 0.0
             row = self._history_row(totals, pressure[inside])
@@ -182,6 +185,13 @@ class _Run:
                 write(next_frame, now, pressure, inside, row)
                 next_frame += 1
         return next_frame
+
+    def _audit(self) -> Totals:
+        """The present totals, compared with those at the start."""
+        totals = totals_of(self.solver)
+        self.audit.add(totals)
+        self.audited_step = self.steps
+        return totals
 
     def _history_row(self, totals: Totals, pressure: np.ndarray) -> dict[str, float]:
         clock = self.state.clock_values()
