@@ -81,6 +81,11 @@ class Model:
         return 1.0 if self.config.transfer is Transfer.APIC else self.config.pic_share
 
     @property
+    def ambient_pressure(self) -> float:
+        """Pressure outside the open faces [Pa]; none without such a face."""
+        return self.scene.ambient_pressure if Wall.OPEN in self.scene.walls.faces() else 0.0
+
+    @property
     def damped(self) -> bool:
         """Whether the conservative damping acts."""
         return self.config.transfer is Transfer.DAMPED_FLIP

@@ -20,7 +20,7 @@ from warp_mpm.model import Model, build_model
 from warp_mpm.output.frame import Frame, SectionPicture
 from warp_mpm.progress import Progress, Silent
 from warp_mpm.recorder import Recorder, StepRecord
-from warp_mpm.scene import Scene
+from warp_mpm.scene import Charge, Scene
 from warp_mpm.section import section_pressure
 from warp_mpm.solver import Solver
 from warp_mpm.state import State
@@ -262,6 +262,7 @@ class _Run:
             "threads": self.launcher.threads,
             "particles": self.scene.particle_count,
             "cells": list(self.scene.domain.cells),
+            "charges": [_charge_values(charge) for charge in self.scene.charges],
             "steps": self.steps,
             "end_time_s": float(clock["time"]),
             "wall_s": wall,
@@ -290,6 +291,19 @@ def color_limit(scene: Scene) -> float:
     if material is not None and material.cj is not None:
         return 1.6 * material.cj.pressure
     return max(c.material.density * c.material.specific_energy for c in scene.charges)
+
+
+def _charge_values(charge: Charge) -> dict[str, Any]:
+    """What the summary says of a charge: how exactly its volume is known above all."""
+    return {
+        "name": charge.name,
+        "material": charge.material.name,
+        "particles": len(charge.positions),
+        "mass_kg": charge.mass,
+        "volume_m3": charge.volume,
+        "volume_tolerance": charge.volume_tolerance,
+        "specific_energy_J_kg": charge.material.specific_energy,
+    }
 
 
 def _solver_values(model: Model) -> dict[str, Any]:

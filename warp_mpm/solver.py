@@ -151,7 +151,7 @@ class Solver:
     def _record_particle_phases(self) -> None:
         state, model = self.state, self.model
         order, shape = model.config.order, model.shape
-        ambient = model.scene.ambient_pressure
+        ambient = model.ambient_pressure
         strain = STRAINS[order]
         blend = model.pic_share > 0.0
         musl, usf = order is Order.MUSL, order is Order.USF

@@ -118,11 +118,16 @@ class BurnZone:
         return float(self.width * (weight * lacking * self.density / self.products_density(fraction)).sum())
 
     def velocity(self, fraction: np.ndarray) -> np.ndarray:
-        """Particle velocity u [m/s] where the burn fraction is F."""
-        slope = (self.gamma - 1.0) * np.asarray(fraction, dtype=float)
-        speed = self.detonation_speed
-        square = speed**2 - 4.0 * (1.0 + 0.5 * slope) * slope * self.initial_energy
-        return (speed - np.sqrt(np.maximum(square, 0.0))) / (2.0 + slope)  # 0 at a CJ front's end, save round-off
+        """Particle velocity u [m/s] where the burn fraction is F.
+
+        The root in a form without differences of nearly equal numbers: u = 2 b E0 / (D + D sqrt(...)), with
+        1 - 4 (1 + b / 2) b E0 / D^2 = 1 - 1 / d^2 + (1 - F) (1 + b / (gamma + 1)) / d^2 under the root.
+        """
+        fraction = np.asarray(fraction, dtype=float)
+        slope = (self.gamma - 1.0) * fraction
+        left = (1.0 - fraction) * (1.0 + slope / (self.gamma + 1.0))
+        root = np.sqrt(1.0 - (1.0 - left) / self.overspeed**2)
+        return 2.0 * slope * self.initial_energy / (self.detonation_speed * (1.0 + root))
 
     def pressure(self, fraction: np.ndarray) -> np.ndarray:
         """Pressure p = rho0 D u [Pa]."""
@@ -151,7 +156,7 @@ class BurnZone:
         for _ in range(NEWTON_STEPS):
             slope = self.width * self.density / self.products_density(fraction)
             fraction = np.minimum(fraction + (target - self.distance(fraction)) / slope, 1.0)
-        return fraction
+        return np.where(distance < self.thickness, fraction, 1.0)
 
     def pressure_error(self, run: float) -> float:
         """Relative L1 distance of the zone from the Taylor wave that it stands for, after a way R = `run` [m].
