@@ -30,6 +30,8 @@ captures the shock, so the error falls exponentially with POINTS: at t = 3 T, wh
 at the wall is 2e-5, 7e-7, 9e-8, 5e-9 p_CJ for 4, 6, 8, 12; up to t = T it is below 1e-7 p_CJ with the values here.
 For gamma = 2 the pressure at the wall is 1.8453, 1.4344, 0.7656 p_CJ at t = 0.1, 0.2, 0.5 T, and the impulse
 to 0.5 and 1.0 T is 0.6904 and 0.9512 p_CJ T.
+A rigid rear wall instead of the free face changes nothing at the wall until 1.07 T (gamma = 2): the shock meets the
+plateau behind the Taylor wave at 0.42 T, and the wave which that sends takes the rest.
 
 Reference: K. P. Stanyukovich, Unsteady Motion of Continuous Media, Pergamon 1960 (reflection of detonation waves);
 R. Courant, K. O. Friedrichs, Supersonic Flow and Shock Waves, Springer 1976, chapter III; C. Canuto, M. Y. Hussaini,
