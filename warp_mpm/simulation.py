@@ -240,7 +240,7 @@ class _Run:
         try:
             from warp_mpm.output import figures
         except ImportError:
-            summary["warnings"].append("figures: not drawn, matplotlib is missing; pip install 'warp-mpm[figures]'")
+            summary["warnings"].append("figures: not drawn, matplotlib is missing; pip install matplotlib")
             return
         directory = self.output / "figures"
         directory.mkdir(exist_ok=True)
