@@ -3,7 +3,8 @@
 A member is a frozen dataclass (the host's side) whose class attributes name its device function:
 
 * `burn_fraction(record, previous, since_arrival, since_booster, density)` -> F in [0, 1], never below `previous`
-* `Record`: the `wp.struct` it reads; `record(burn_width, spacing)` fills one.
+* `Record`: the `wp.struct` it reads, with a field `detonation_speed` [m/s] that limits the time step while matter is
+  unburnt; `record(burn_width, spacing)` fills one.
 * `detonation_speed` [m/s], with which arrival times are computed.
 """
 
