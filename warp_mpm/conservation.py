@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from warp_mpm.config import Order
 from warp_mpm.kernels import reduce
 from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, OUTFLOW_LANES, TALLIES
 from warp_mpm.kernels.walls import REACTIONS
@@ -24,7 +25,7 @@ class Totals:
     released: float  # sum F m E0
     volume: float
     position: np.ndarray  # (3,) sum m x
-    grid_mass: float
+    grid_mass: float | None  # None where the grid still holds the instant before (USF)
     mass_out: np.ndarray  # (6,) per face
     momentum_out: np.ndarray  # (6, 3) per face
     energy_out: float
@@ -65,8 +66,8 @@ class Audit:
         self._gravity_impulse = self._gravity_impulse + self.gravity * mean_mass * (totals.time - last.time)
         self._last = totals
         lost = totals.mass + totals.mass_out.sum() - self.charge_mass
-        grid = totals.grid_mass - totals.mass
-        self.mass_error = max(self.mass_error, abs(lost) / self.charge_mass, abs(grid) / self.charge_mass)
+        grid = 0.0 if totals.grid_mass is None else totals.grid_mass - totals.mass
+        self.mass_error = float(max(self.mass_error, abs(lost) / self.charge_mass, abs(grid) / self.charge_mass))
         defect = totals.momentum - first.momentum + totals.momentum_out.sum(axis=0)
         defect = defect - totals.wall_impulse.sum(axis=0) - self._gravity_impulse
         self.largest_momentum = max(self.largest_momentum, totals.absolute_momentum)
@@ -95,7 +96,7 @@ def totals_of(solver: Solver) -> Totals:
         released=float(sums[reduce.AUDIT_RELEASED]),
         volume=float(sums[reduce.AUDIT_VOLUME]),
         position=sums[reduce.AUDIT_POSITION : reduce.AUDIT_POSITION + 3].copy(),
-        grid_mass=grid_mass,
+        grid_mass=None if solver.model.config.order is Order.USF else grid_mass,
         mass_out=outflow[:, 0].copy(),
         momentum_out=outflow[:, 1:4].copy(),
         energy_out=float(outflow[:, 4].sum()),
