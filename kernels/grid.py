@@ -172,13 +172,13 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
         n = node_index(grid, index[0], index[1], index[2])
         own = grid.node[n]
         total = own
-        energy = grid.pressure[n]
+        pressure_volume = grid.pressure[n]
         owned = ghost_sides(boundary, grid.cells, index)
         ghosts = owned[0] + owned[1] + owned[2] > 0
         free = free_components(boundary, grid.cells, index)
         if ghosts:
             total = fold(grid, boundary, index, owned)
-            energy = fold_pressure(grid, index, owned)
+            pressure_volume = fold_pressure(grid, index, owned)
         mass = total[3]
         filling = total[7] / node_volume(grid, index)
         velocity = first_three(own)
@@ -192,12 +192,12 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
         pressure = ZERO
         if wp.static(force) and mass > grid.light_mass:
             acceleration = wp.cw_mul(free, second_three(total) * inverse + boundary.gravity)
-            pressure = energy / (node_volume(grid, index) * wp.max(filling, ONE))
+            pressure = pressure_volume / (node_volume(grid, index) * wp.max(filling, ONE))
             if not beyond_face(grid, index):
                 if filling >= HALF:
                     raise_maximum(peaks, slot, pressure)
             elif filling > ZERO:
-                pressure = energy / (node_volume(grid, index) * filling)
+                pressure = pressure_volume / (node_volume(grid, index) * filling)
         if ghosts or free[0] * free[1] * free[2] == ZERO:
             if wp.static(force):
                 tally_walls(grid, boundary, index, owned, True, mass, ONE, acceleration, reactions, slot)

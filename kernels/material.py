@@ -34,11 +34,11 @@ from warp_mpm.kernels.viscosity import Viscosity, viscous_pressure, viscous_rate
 
 RELAXATION = wp.constant(scalar(0.1))  # of the density towards full nodes, per cell that sound crosses
 FILLED = wp.constant(scalar(0.95))  # nodes fuller than this relax fully
+SPARSE = wp.constant(scalar(0.80))  # nodes emptier than this, at a free surface, not at all
 # Where a wave arrives, whether a particle burns already is a matter of round-off: what a switch would turn into a jump
 # sets in over a short part of the burn instead, so that mirror images stay mirror images.
 IGNITED = wp.constant(scalar(0.1))  # burn fraction from which on the viscosity acts fully
 BURNT_OUT = wp.constant(scalar(0.9))  # the relaxation sets in over the last tenth of the burn
-SPARSE = wp.constant(scalar(0.80))  # nodes emptier than this, at a free surface, not at all
 
 
 class Strain(Enum):

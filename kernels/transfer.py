@@ -1,7 +1,7 @@
 """Particle -> grid and grid -> particle: paper eqs. 4-8, 12-16, for any shape function, order and transfer.
 
-Kernels are composed for the shape and the variant asked for, once each (cached). Every particle kernel works on
-`count` particles from `begin` on.
+Kernels are composed for the shape and the variant asked for, once each (cached). Every particle kernel works on the
+particles from `begin` on, one a thread.
 """
 
 import functools
@@ -112,19 +112,19 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool) -> w
         begin: int,
     ):
         p = begin + wp.tid()
+        mass = particles.mass[p]
+        if mass == ZERO:
+            return
         fraction = particles.fraction[p]
         first = first_node(grid, particles.cell[p], fraction)
         wx = weights(fraction[0], half_width)
         wy = weights(fraction[1], half_width)
         wz = weights(fraction[2], half_width)
-        mass = particles.mass[p]
-        if mass == ZERO:
-            return
         stamp_blocks(grid, lowest_node(particles.cell[p], fraction), width, clock[0].step)
         volume = mass / particles.density[p]
         carried = mass * particles.velocity[p]
-        energy = particles.pressure[p] * volume
-        pull = energy + (particles.viscous_pressure[p] - ambient_pressure) * volume
+        pressure_volume = particles.pressure[p] * volume
+        pull = pressure_volume + (particles.viscous_pressure[p] - ambient_pressure) * volume
         sx = slopes(fraction[0], half_width) * (pull / grid.spacing[0])
         sy = slopes(fraction[1], half_width) * (pull / grid.spacing[1])
         sz = slopes(fraction[2], half_width) * (pull / grid.spacing[2])
@@ -146,7 +146,7 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool) -> w
                         value += vector8(extra[0], extra[1], extra[2], ZERO, ZERO, ZERO, ZERO, ZERO)
                     if wp.static(force):
                         value = multiply_add8(value, sz[k], across)
-                        wp.atomic_add(grid.pressure, row + k, wij * wz[k] * energy)
+                        wp.atomic_add(grid.pressure, row + k, wij * wz[k] * pressure_volume)
                     scatter_add8(grid.node, row + k, ONE, value)
 
     return scatter
@@ -173,6 +173,9 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool) -> 
         begin: int,
     ):
         p = begin + wp.tid()
+        mass = particles.mass[p]
+        if mass == ZERO:
+            return
         dt = clock[0].dt
         fraction = particles.fraction[p]
         first = first_node(grid, particles.cell[p], fraction)
@@ -204,7 +207,6 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool) -> 
             particles.affine[p] = gradient
         particles.velocity[p] = velocity
         if wp.static(reproject):
-            mass = particles.mass[p]
             for i in range(width):
                 for j in range(width):
                     row = first + i * grid.stride_x + j * grid.stride_y

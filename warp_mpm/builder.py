@@ -19,6 +19,7 @@ from warp_mpm.materials import Material
 from warp_mpm.scene import Domain, Scene, SectionPlane, Segment, Vector, Walls
 
 OUTSIDE_TOLERANCE = 1e-9  # of the domain's size
+PICTURES = 6  # instants worth a picture, if a scene names none
 
 Given = TypeVar("Given")
 
@@ -57,7 +58,7 @@ class SceneBuilder:
         self._front_path: Segment | None = None
         self._line: Segment | None = None
         self._collision_points: list[Vector] = []
-        self._picture_times: tuple[float, ...] = ()
+        self._picture_times: tuple[float, ...] | None = None
         self._section: SectionPlane | None = None
 
     # ---- where the material may be ---------------------------------------------------------------------------------
@@ -206,7 +207,7 @@ class SceneBuilder:
         self._collision_points.append(checks.vector(here, point))
 
     def picture_times(self, times: Iterable[float]) -> None:
-        """Set the instants worth a picture [s].
+        """Set the instants worth a picture [s]; without this they are six, equally spaced up to the end.
 
         Raises:
             InputError: one is not a finite number of at least 0.
@@ -245,6 +246,9 @@ class SceneBuilder:
         reach = max(domain.spacing) / 2
         detonators = resolve_detonators(self._here, self._detonators, self._bodies, reach)
         charges = cut_charges(self._here, self._bodies, domain)
+        pictures = self._picture_times
+        if pictures is None:
+            pictures = tuple(end_time * part / PICTURES for part in range(1, PICTURES + 1))
         return Scene(
             name=self.name,
             domain=domain,
@@ -260,7 +264,7 @@ class SceneBuilder:
             front_path=self._front_path,
             line=self._line if self._line is not None else self._front_path,
             collision_points=tuple(self._collision_points),
-            picture_times=self._picture_times,
+            picture_times=pictures,
             warnings=tuple(
                 warning
                 for body, charge in zip(self._bodies, charges, strict=True)
@@ -293,7 +297,7 @@ class SceneBuilder:
             if np.any(point < domain.lower - tolerance) or np.any(point > domain.upper + tolerance):
                 expected = f"inside the domain, from {domain.lower} to {domain.upper} m"
                 raise mistake(f"{self._here}: {name}", expected, point)
-        for time in self._picture_times:
+        for time in self._picture_times or ():
             if time > end_time:
                 raise mistake(f"{self._here}: picture_times", f"at most the end time, {end_time:g} s", f"{time:g} s")
 

@@ -87,7 +87,8 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
             raise mistake(
                 f"{where}: charge {body.name!r}", "at least one particle in it", "none", "choose a smaller cell size"
             )
-        charges.append(Charge(body.name, body.solid, body.material, positions, volume, tolerance))
+        per_axis = body.particles_per_axis
+        charges.append(Charge(body.name, body.solid, body.material, positions, volume, tolerance, per_axis))
     for first, second in combinations(charges, 2):
         _check_apart(where, first, second)
     return tuple(charges)

@@ -18,8 +18,8 @@ class ShapeFunction(Enum):
 class Order(Enum):
     """When the strain is taken in the step (Bardenhagen 2002; Nairn 2003).
 
-    MUSL: from the velocity re-projected after the particles moved on. USL: from the velocity at the end of the step.
-    USF: from the velocity at its start, before the forces.
+    MUSL: from the particles' new velocities, re-projected before they move. USL: from the nodes' velocity at the end of
+    the step. USF: from the nodes' velocity at its start, before the forces.
     """
 
     MUSL = "musl"

@@ -41,6 +41,9 @@ class Audit:
     * mass: |grid - particles| / charge mass, and |particles + outflow - rho0 V| / charge mass;
     * momentum: |P - P(0) + P_out - J_walls - J_gravity| / max of sum m |v|;
     * energy: |E - E(0)| / E(0), outflow, ambient work and potential energy added, clamps taken off.
+
+    Under gravity both figures hold without outflow: the potential energy and the weight of matter that leaves between
+    two audits are known to the interval between them only.
     """
 
     gravity: np.ndarray  # (3,) [m/s2]

@@ -29,7 +29,9 @@ class OnMismatch(Enum):
 
 @dataclass(frozen=True)
 class Material:
-    """A material. Explosives are made by `explosive`, which checks them.
+    """A material. Inert ones are made directly, explosives by `explosive`, which checks them.
+
+    Its initial pressure is that of its equation of state; for an ideal gas (gamma - 1) rho0 e.
 
     Raises:
         InputError: density or energy is not a positive finite number.

@@ -128,12 +128,11 @@ def build_model(scene: Scene, config: SolverConfig, device: wp.Device) -> Model:
 def _charge_model(scene: Scene, charge: Charge, burn_width: float) -> ChargeModel:
     burn = charge.material.burn
     spacing = max(scene.domain.spacing)
-    per_axis = round((scene.domain.cell_volume / charge.particle_volume) ** (1 / 3))
     return ChargeModel(
         material=charge.material,
         eos_record=charge.material.equation_of_state.record(),
         burn_record=0 if burn is None else burn.record(burn_width, spacing),
-        half_width=0.5 / max(1, per_axis),
+        half_width=0.5 / charge.particles_per_axis,
         ignitions=tuple(_ignition(scene, d, spacing) for d in scene.detonators if charge.name in d.charges),
     )
 

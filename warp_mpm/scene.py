@@ -82,6 +82,7 @@ class Charge:
     positions: np.ndarray  # (n, 3) float64 [m]
     volume: float  # [m3], exact where a formula exists
     volume_tolerance: float  # relative; 0 when the volume is exact
+    particles_per_axis: int = 2  # along each axis of every cell
 
     @property
     def particle_volume(self) -> float:

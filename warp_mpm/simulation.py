@@ -20,7 +20,7 @@ from warp_mpm.model import Model, build_model
 from warp_mpm.output.frame import Frame, SectionPicture
 from warp_mpm.progress import Progress, Silent
 from warp_mpm.recorder import Recorder, StepRecord
-from warp_mpm.scene import Charge, Scene
+from warp_mpm.scene import Charge, Scene, Wall
 from warp_mpm.section import section_pressure
 from warp_mpm.solver import Solver
 from warp_mpm.state import State
@@ -74,8 +74,11 @@ def simulate(
     try:
         run.to_the_end()
     except (KeyboardInterrupt, SimulationError) as error:
-        run.finish(begin, "interrupted" if isinstance(error, KeyboardInterrupt) else f"failed: {error}")
+        if run.history:  # before the first frame there is nothing to sum up
+            run.finish(begin, "interrupted" if isinstance(error, KeyboardInterrupt) else f"failed: {error}")
         raise
+    finally:
+        run.launcher.close()
     return run.finish(begin, "complete")
 
 
@@ -130,7 +133,6 @@ class _Run:
 
     def finish(self, begin: float, status: str) -> Result:
         """Sum up what there is, and draw it."""
-        self.launcher.close()
         record = self.recorder.result()
         summary = {"status": status, **self._summary(record, time.perf_counter() - begin)}
         if self.output is not None:
@@ -280,13 +282,24 @@ class _Run:
                 if name.startswith("mass_out_")
             },
             "pressure_spread": final["pressure_spread"],
-            "particle_volume_error": final["particle_volume_m3"] / sum(c.volume for c in self.scene.charges) - 1.0,
-            "warnings": list(self.scene.warnings),
+            "particle_volume_error": self._volume_error(),
+            "warnings": [*self.scene.warnings, *self._frame_warnings()],
         }
+
+    def _volume_error(self) -> float | None:
+        """Relative difference of the particles' volume from the charges'; None where gas may expand out of faces."""
+        if Wall.OPEN in self.scene.walls.faces():
+            return None
+        return self.history[-1]["particle_volume_m3"] / sum(charge.volume for charge in self.scene.charges) - 1.0
+
+    def _frame_warnings(self) -> list[str]:
+        if self.save.frames <= self.steps + 1:
+            return []
+        return [f"frames: {self.save.frames} asked for, but only {self.steps} steps taken: some frames are repeated"]
 
 
 def color_limit(scene: Scene) -> float:
-    """Pressure of the last colour [Pa]: 1.6 p_CJ shows fronts and collisions; without explosive, rho c^2."""
+    """Pressure of the last colour [Pa]: 1.6 p_CJ shows fronts and collisions; without explosive, rho e."""
     material = lit_explosive(scene)
     if material is not None and material.cj is not None:
         return 1.6 * material.cj.pressure

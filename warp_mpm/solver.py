@@ -116,7 +116,7 @@ class Solver:
         self.launcher.run(tasks[1::2], self.state.count)
 
     def _over_particles(self, tasks: list[Task]) -> None:
-        """Particle work that writes to particles alone."""
+        """Particle work that writes to particles and their slab's reductions alone."""
         self.launcher.run(tasks, self.state.count)
 
     def _over_nodes(self, tasks: list[Task]) -> None:

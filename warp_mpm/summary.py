@@ -26,8 +26,16 @@ class FrontSpeed:
 
 
 def lit_explosive(scene: Scene) -> Material | None:
-    """The explosive that the first detonator lights, or the first explosive; None without one."""
+    """The explosive that the scene is about: the one in which the middle of the front path lies.
+
+    Without a front path the one that the first detonator lights, or the first one; None without any.
+    """
     explosives = {charge.name: charge.material for charge in scene.charges if charge.material.burn is not None}
+    if scene.front_path is not None:
+        middle = scene.front_path.points(3)[1:2]
+        for charge in scene.charges:
+            if charge.name in explosives and charge.solid.contains(middle)[0]:
+                return charge.material
     for detonator in scene.detonators:
         for name in detonator.charges:
             if name in explosives:
@@ -38,6 +46,14 @@ def lit_explosive(scene: Scene) -> Material | None:
 def ideal_arrival(scene: Scene, points: np.ndarray, speed: float) -> np.ndarray:
     """Arrival times (n,) [s] of straight waves from the scene's detonators at points (n, 3)."""
     return straight_arrival(scene.detonators, points, speed)
+
+
+def _path_arrival(scene: Scene, points: np.ndarray, material: Material) -> np.ndarray:
+    """Ideal arrival times (n,) [s] from the detonators that light charges of a material, at its own speed."""
+    names = {charge.name for charge in scene.charges if charge.material is material}
+    lighting = [detonator for detonator in scene.detonators if names.intersection(detonator.charges)]
+    assert material.burn is not None
+    return straight_arrival(lighting, points, material.burn.detonation_speed)
 
 
 def arrival_times(record: LineRecord, threshold: float) -> np.ndarray:
@@ -66,7 +82,7 @@ def front_speed(scene: Scene, record: StepRecord, material: Material) -> FrontSp
     speed, start = np.polyfit(time, distance[used], 1)
     residual = float(np.abs(distance[used] - (speed * time + start)).max())
     assert scene.front_path is not None
-    ideal = ideal_arrival(scene, scene.front_path.points(len(distance))[used], material.burn.detonation_speed)
+    ideal = _path_arrival(scene, scene.front_path.points(len(distance))[used], material)
     offset = float(material.burn.detonation_speed * np.mean(ideal - time))
     return FrontSpeed(float(speed), residual, offset)
 
@@ -111,7 +127,7 @@ def front_pressure(scene: Scene, record: StepRecord, material: Material) -> floa
     if record.path_pressure is None or material.burn is None or scene.front_path is None:
         return None
     ends = np.array([scene.front_path.start, scene.front_path.end])
-    start, end = ideal_arrival(scene, ends, material.burn.detonation_speed)
+    start, end = _path_arrival(scene, ends, material)
     first, last = (start + share * (end - start) for share in PLATEAU_PART)
     used = (record.time >= first) & (record.time <= last)
     return float(np.median(record.path_pressure[used])) if used.any() else None
@@ -125,10 +141,12 @@ def gauge_pressure(scene: Scene, record: StepRecord, material: Material) -> floa
     """
     if record.path is None or material.burn is None or scene.front_path is None:
         return None
-    end = ideal_arrival(scene, np.array([scene.front_path.end]), material.burn.detonation_speed)[0]
+    end = _path_arrival(scene, np.array([scene.front_path.end]), material)[0]
     before = record.time <= end
     share = record.path.distance / record.path.distance[-1]
     used = (share >= PLATEAU_PART[0]) & (share <= PLATEAU_PART[1])
+    if not used.any() or record.time[-1] < end:
+        return None
     return float(np.median(record.path.pressure[before][:, used].max(axis=0)))
 
 
