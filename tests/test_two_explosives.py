@@ -32,13 +32,16 @@ def test_the_explosive_of_the_front_path(path, name):
 
 
 def test_figures_are_those_of_the_slow_explosive(device):
-    """The path lies in the slow one, 9 cells from its detonator: the speed is known to a cell in them."""
+    """The path lies in the slow one, 9 cells from its detonator: the speed is known to a cell in them.
+
+    A programmed burn's front stays below p_CJ; taken with the fast explosive's arrival times it would show nothing.
+    """
     scene = two_explosives((0.2, 0.11), end_time=25e-6)
     summary = mpm.simulate(scene, save=mpm.Save(frames=2), device=device).summary
     assert summary["detonation_speed_m_s"] == 4000.0
     assert summary["p_cj_pa"] == pytest.approx(1000.0 * 4000.0**2 / 4.0, rel=1e-5)
     assert summary["front_speed_m_s"] == pytest.approx(4000.0, rel=1.0 / 9.0)
-    assert 0.3 < summary["front_gauge_pressure_pa"] / summary["p_cj_pa"] < 1.0
+    assert 0.0 < summary["front_gauge_pressure_pa"] < summary["p_cj_pa"]
 
 
 def test_a_front_that_has_not_arrived_has_no_pressure(device):

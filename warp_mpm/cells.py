@@ -54,7 +54,9 @@ def check_aspect(where: str, domain: Domain) -> None:
 def _check_counts(where: str, counts: np.ndarray) -> None:
     if counts.max() > MOST_CELLS:
         got = " x ".join(f"{count:.0f}" for count in counts)
-        raise mistake(f"{where}: cells", f"at most {MOST_CELLS} per axis", got, "choose a larger cell size")
+        raise mistake(
+            f"{where}: cells", f"at most {MOST_CELLS} per axis", got, "choose a larger cell size or a smaller domain"
+        )
 
 
 def _vector(values: np.ndarray) -> Vector:
