@@ -15,7 +15,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mpm.kernels.motion import Faces, place, tally_outflow
+from warp_mpm.kernels.motion import Faces, place, settle
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import (
     AMBIENT_WORK,
@@ -330,17 +330,8 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
             step = wp.cw_div(dt * strained.motion, grid.spacing)
             after = place(grid.cells, faces, cell, fraction, step)
             moved = after.moved
-            if after.fault:
-                wp.atomic_max(faults, slab, particles.index[p] + 1)
-            elif after.left_through >= 0:
-                tally_outflow(mass, velocity, energy, after.left_through, slab, tallies)
-                particles.mass[p] = ZERO
-                particles.pressure[p] = ZERO
-                particles.viscous_pressure[p] = ZERO
+            if not settle(particles, p, after, mass, velocity, energy, slab, tallies, faults):
                 return
-            else:
-                particles.cell[p] = wp.vec3s(wp.int16(after.cell[0]), wp.int16(after.cell[1]), wp.int16(after.cell[2]))
-                particles.fraction[p] = after.fraction
 
         # Burn fraction and pressures for the next forces.
         since_arrival = ZERO

@@ -112,6 +112,33 @@ def place(
     return result
 
 
+@wp.func
+def settle(
+    particles: Particles,
+    p: int,
+    after: Place,
+    mass: scalar,
+    velocity: vector3,
+    energy: scalar,
+    slab: int,
+    tallies: wp.array(dtype=wp.float64),
+    faults: wp.array(dtype=int),
+) -> bool:
+    """Put a particle in its place, take it out if it left, or report a fault; returns whether it is still there."""
+    if after.fault:
+        wp.atomic_max(faults, slab, particles.index[p] + 1)
+        return True
+    if after.left_through >= 0:
+        tally_outflow(mass, velocity, energy, after.left_through, slab, tallies)
+        particles.mass[p] = ZERO
+        particles.pressure[p] = ZERO
+        particles.viscous_pressure[p] = ZERO
+        return False
+    particles.cell[p] = wp.vec3s(wp.int16(after.cell[0]), wp.int16(after.cell[1]), wp.int16(after.cell[2]))
+    particles.fraction[p] = after.fraction
+    return True
+
+
 @functools.cache
 def move_kernel(shape: Shape) -> wp.Kernel:
     """Move the particles with the grid (for USF, whose material update comes before the forces)."""
@@ -141,15 +168,6 @@ def move_kernel(shape: Shape) -> wp.Kernel:
         moved = Maxima()
         moved[DISPLACEMENT] = after.moved
         raise_maxima(maxima, slab, moved)
-        if after.fault:
-            wp.atomic_max(faults, slab, particles.index[p] + 1)
-        elif after.left_through >= 0:
-            tally_outflow(mass, particles.velocity[p], particles.energy[p], after.left_through, slab, tallies)
-            particles.mass[p] = ZERO
-            particles.pressure[p] = ZERO
-            particles.viscous_pressure[p] = ZERO
-        else:
-            particles.cell[p] = wp.vec3s(wp.int16(after.cell[0]), wp.int16(after.cell[1]), wp.int16(after.cell[2]))
-            particles.fraction[p] = after.fraction
+        settle(particles, p, after, mass, particles.velocity[p], particles.energy[p], slab, tallies, faults)
 
     return move
