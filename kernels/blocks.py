@@ -9,22 +9,26 @@ import warp as wp
 from warp_mpm.kernels.records import Grid
 
 EDGE = wp.constant(4)
+STENCIL = wp.constant(3)  # nodes along an axis, at most
 GHOST_REACH = wp.constant(2)  # nodes from one next to a wall to its ghost behind the wall
 NODES = wp.constant(64)  # of a block
 
 
 @wp.func
-def last_block(blocks: int, lowest: int, width: int) -> int:
+def last_block(blocks: int, lowest: int) -> int:
     """Last block along an axis that a stencil reaches, and the ghost that its last node may own, two nodes further."""
-    return wp.min((lowest + 1 + width - 1 + GHOST_REACH) // EDGE, blocks - 1)
+    return wp.min((lowest + 1 + STENCIL - 1 + GHOST_REACH) // EDGE, blocks - 1)
 
 
 @wp.func
-def stamp_blocks(grid: Grid, lowest: wp.vec3i, width: int, step: int):
-    """Say that a stencil of `width` nodes per axis, the lowest given, was scattered to in a step."""
-    for i in range((lowest[0] + 1) // EDGE, last_block(grid.blocks[0], lowest[0], width) + 1):
-        for j in range((lowest[1] + 1) // EDGE, last_block(grid.blocks[1], lowest[1], width) + 1):
-            for k in range((lowest[2] + 1) // EDGE, last_block(grid.blocks[2], lowest[2], width) + 1):
+def stamp_blocks(grid: Grid, lowest: wp.vec3i, step: int):
+    """Say that a stencil of three nodes per axis, the lowest given, was scattered to in a step.
+
+    That covers every shape function's nodes, and the cells of the field.
+    """
+    for i in range((lowest[0] + 1) // EDGE, last_block(grid.blocks[0], lowest[0]) + 1):
+        for j in range((lowest[1] + 1) // EDGE, last_block(grid.blocks[1], lowest[1]) + 1):
+            for k in range((lowest[2] + 1) // EDGE, last_block(grid.blocks[2], lowest[2]) + 1):
                 grid.stamps[(i * grid.blocks[1] + j) * grid.blocks[2] + k] = step
 
 

@@ -9,6 +9,7 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
+from warp_mpm.kernels.filling import inside, solve_cell, stands_for_itself
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index, raise_maximum
 from warp_mpm.kernels.walls import (
@@ -37,6 +38,7 @@ def clear(grid: Grid, clock: wp.array(dtype=Clock), begin: int):
                 m = node_index(grid, index[0], index[1], index[2])
                 grid.node[m] = vector8()
                 grid.pressure[m] = ZERO
+                grid.cell_filling[m] = ZERO
                 grid.reprojected[m] = vector4()
 
 
@@ -60,6 +62,17 @@ def beyond_face(grid: Grid, index: wp.vec3i) -> bool:
         if index[axis] < 0 or index[axis] > grid.cells[axis]:
             beyond = True
     return beyond
+
+
+@wp.func
+def occupied_volume(grid: Grid, index: wp.vec3i, filling: scalar) -> scalar:
+    """Volume that a node's content is related to [m3].
+
+    Inside the material it is that of the particles, so that the field is a mean of what they have, however they lie; at
+    a free surface it is the node's own, so that the field fades towards the vacuum.
+    """
+    share = inside(filling)
+    return node_volume(grid, index) * (share * filling + ONE - share)
 
 
 @wp.func
@@ -149,9 +162,9 @@ def mirror(
 
 
 @functools.cache
-def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
-    """Sums of the scatter -> values: v = P / M, a = f / M + g; filling = V / V_i, p = sum w V p / max(V, V_i).
-
+def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
+    """Sums of the scatter -> values: v = P / M, a = f / M + g; filling = V / V_i, and the field pressure,
+    sum w V p over the occupied volume. `cells` solves their filling.
     `momentum` solves the first, `force` the second (all at once but for USF, whose forces come later). Tallies what
     walls add: `reactions` to forces [N], `impulses` to momenta [kg m/s], the latter for PIC and APIC, whose particles
     take the nodes' velocity over with a share of `pic_share`. The highest pressure of nodes at least half filled
@@ -192,7 +205,7 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
         pressure = ZERO
         if wp.static(force) and mass > grid.light_mass:
             acceleration = wp.cw_mul(free, second_three(total) * inverse + boundary.gravity)
-            pressure = pressure_volume / (node_volume(grid, index) * wp.max(filling, ONE))
+            pressure = pressure_volume / occupied_volume(grid, index, filling)
             if not beyond_face(grid, index):
                 if filling >= HALF:
                     raise_maximum(peaks, slot, pressure)
@@ -228,8 +241,18 @@ def solve_kernel(momentum: bool, force: bool) -> wp.Kernel:
                 index = node_of_block(grid, block, n)
                 if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
                     solve_node(grid, boundary, pic_share, reactions, impulses, peaks, slot, index)
+                if wp.static(cells) and stands_for_itself(boundary, grid.cells, index):
+                    solve_cell(grid, boundary, index)
 
     return solve
+
+
+@wp.kernel(enable_backward=False)
+def measure_density(grid: Grid, density: wp.array3d(dtype=scalar)):
+    """Density at the nodes of the domain [kg/m3]: mass over the occupied volume, as the field pressure."""
+    i, j, k = wp.tid()
+    node = grid.node[node_index(grid, i, j, k)]
+    density[i, j, k] = node[3] / occupied_volume(grid, wp.vec3i(i, j, k), node[7])
 
 
 @wp.func
@@ -246,56 +269,80 @@ def fold_reprojected(grid: Grid, boundary: Boundary, index: wp.vec3i, owned: wp.
     return total
 
 
-@wp.func
-def solve_reprojected_node(
-    grid: Grid, boundary: Boundary, alpha: scalar, impulses: wp.array(dtype=wp.float64), slot: int, index: wp.vec3i
-):
-    """One node of `solve_reprojected`."""
-    n = node_index(grid, index[0], index[1], index[2])
-    mass = grid.node[n][3]
-    owned = ghost_sides(boundary, grid.cells, index)
-    free = free_components(boundary, grid.cells, index)
-    total = grid.reprojected[n]
-    if owned[0] + owned[1] + owned[2] > 0:
-        total = fold_reprojected(grid, boundary, index, owned)
-    inverse = wp.where(mass > grid.light_mass, ONE / mass, ZERO)
-    velocity = wp.cw_mul(free, vector3(total[0], total[1], total[2])) * inverse
-    heat = alpha * wp.max(total[3] * inverse - HALF * wp.dot(velocity, velocity), ZERO)
-    near_wall = owned[0] + owned[1] + owned[2] > 0 or free[0] * free[1] * free[2] == ZERO
-    if near_wall:
+@functools.cache
+def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
+    """Re-projected sums -> velocity v_r and the damping's heat H = alpha (sum w m v^2 / 2 / M - |v_r|^2 / 2) >= 0.
+
+    Besides, the nodes' velocity v^n becomes v^n + dt a, which moves the particles, and their acceleration the mean
+    velocity (v^n + v_r) / 2, which does the work; when `sharpened`, a comes from `kick`, and both velocities go there.
+    The blocks are those of the scatter at the end of the step before.
+    """
+
+    @wp.func
+    def write(grid: Grid, m: int, sign: vector3, v: vector3, heat: scalar, dt: scalar):
+        """Write what belongs to a node, or with other signs to a ghost of it."""
+        node = grid.node[m]
+        before = first_three(node)
+        a = second_three(node)
+        if wp.static(sharpened):
+            a = second_three(grid.kick[m])
+        after = wp.cw_mul(sign, v)
+        moving = before + dt * a
+        mean = HALF * (before + after)
+        grid.reprojected[m] = vector4(after[0], after[1], after[2], heat)
+        values = vector8(moving[0], moving[1], moving[2], node[3], mean[0], mean[1], mean[2], node[7])
+        if wp.static(sharpened):
+            grid.kick[m] = values
+        else:
+            grid.node[m] = values
+
+    @wp.func
+    def solve_node(
+        grid: Grid,
+        boundary: Boundary,
+        alpha: scalar,
+        dt: scalar,
+        impulses: wp.array(dtype=wp.float64),
+        slot: int,
+        index: wp.vec3i,
+    ):
+        n = node_index(grid, index[0], index[1], index[2])
+        mass = grid.node[n][3]
+        owned = ghost_sides(boundary, grid.cells, index)
+        free = free_components(boundary, grid.cells, index)
+        total = grid.reprojected[n]
+        if owned[0] + owned[1] + owned[2] > 0:
+            total = fold_reprojected(grid, boundary, index, owned)
+        inverse = wp.where(mass > grid.light_mass, ONE / mass, ZERO)
+        velocity = wp.cw_mul(free, vector3(total[0], total[1], total[2])) * inverse
+        heat = alpha * wp.max(total[3] * inverse - HALF * wp.dot(velocity, velocity), ZERO)
         for i in range(image_count(owned[0])):
             for j in range(image_count(owned[1])):
                 for k in range(image_count(owned[2])):
                     sides = image_sides(owned, i, j, k)
                     m = image_node(grid, index, sides)
-                    x = grid.reprojected[m]
-                    image_mass = grid.node[m][3]
-                    momentum = alpha * vector3(x[0], x[1], x[2])
-                    value = alpha * image_mass * velocity
-                    tally_reaction(boundary, grid, index, sides, momentum, vector3(), value, impulses, slot)
-                    s = image_signs(boundary, sides)
-                    v = wp.cw_mul(s, velocity)
-                    grid.reprojected[m] = vector4(v[0], v[1], v[2], heat)
-    grid.reprojected[n] = vector4(velocity[0], velocity[1], velocity[2], heat)
+                    if owned[0] + owned[1] + owned[2] > 0 or free[0] * free[1] * free[2] == ZERO:
+                        x = grid.reprojected[m]
+                        momentum = alpha * vector3(x[0], x[1], x[2])
+                        value = alpha * grid.node[m][3] * velocity
+                        tally_reaction(boundary, grid, index, sides, momentum, vector3(), value, impulses, slot)
+                    write(grid, m, image_signs(boundary, sides), velocity, heat, dt)
 
+    @wp.kernel(enable_backward=False, module="unique")
+    def solve_reprojected(
+        grid: Grid,
+        boundary: Boundary,
+        clock: wp.array(dtype=Clock),
+        impulses: wp.array(dtype=wp.float64),
+        slot: int,
+        begin: int,
+    ):
+        thread = wp.tid()
+        block = begin + thread // grid.workers
+        if is_active(grid, block, clock[0].step - 1):
+            for n in range(thread % grid.workers, NODES, grid.workers):
+                index = node_of_block(grid, block, n)
+                if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
+                    solve_node(grid, boundary, clock[0].damping, clock[0].dt, impulses, slot, index)
 
-@wp.kernel(enable_backward=False)
-def solve_reprojected(
-    grid: Grid,
-    boundary: Boundary,
-    clock: wp.array(dtype=Clock),
-    impulses: wp.array(dtype=wp.float64),
-    slot: int,
-    begin: int,
-):
-    """Re-projected sums -> velocity v_r and the damping's heat H = alpha (sum w m v^2 / 2 / M - |v_r|^2 / 2) >= 0.
-
-    The blocks are those of the scatter at the end of the step before.
-    """
-    thread = wp.tid()
-    block = begin + thread // grid.workers
-    if is_active(grid, block, clock[0].step - 1):
-        for n in range(thread % grid.workers, NODES, grid.workers):
-            index = node_of_block(grid, block, n)
-            if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
-                solve_reprojected_node(grid, boundary, clock[0].damping, impulses, slot, index)
+    return solve_reprojected

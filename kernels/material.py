@@ -15,6 +15,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mpm.kernels.filling import gather_filling, inside
 from warp_mpm.kernels.motion import Faces, place, settle
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import (
@@ -32,9 +33,7 @@ from warp_mpm.kernels.transfer import stencil_functions
 from warp_mpm.kernels.vectors import multiply_add4, multiply_add8
 from warp_mpm.kernels.viscosity import Viscosity, viscous_pressure, viscous_rate
 
-RELAXATION = wp.constant(scalar(0.1))  # of the density towards full nodes, per cell that sound crosses
-FILLED = wp.constant(scalar(0.95))  # nodes fuller than this relax fully
-SPARSE = wp.constant(scalar(0.80))  # nodes emptier than this, at a free surface, not at all
+RELAXATION = wp.constant(scalar(0.3))  # of the density towards full cells, per cell that sound crosses
 # Where a wave arrives, whether a particle burns already is a matter of round-off: what a switch would turn into a jump
 # sets in over a short part of the burn instead, so that mirror images stay mirror images.
 IGNITED = wp.constant(scalar(0.1))  # burn fraction from which on the viscosity acts fully
@@ -59,7 +58,6 @@ class StrainIncrement:
     slip: vector3  # u = sum w (v_r - vF) [m/s]
     slip_squared: scalar  # sum w |v_r - vF|^2 [m2/s2]
     heat: scalar  # sum w H [J/kg]
-    filling: scalar  # sum w (filling of the node)
 
 
 @functools.cache
@@ -84,8 +82,8 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
         sums = vector8()  # sum w (nodal values)
         nodal_sums = vector4()  # sum w (re-projected values)
         slip_squared = ZERO
-        divergence = ZERO  # of v^n
-        second_divergence = ZERO  # of the re-projected velocity or of the acceleration
+        divergence = ZERO  # of the velocity that changes the volume: re-projected, moving (damped), or v^n
+        second_divergence = ZERO  # of the velocity that does the work, or of the acceleration
         for i in range(width):
             for j in range(width):
                 row = first + i * grid.stride_x + j * grid.stride_y
@@ -111,25 +109,26 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
                 sums = multiply_add8(sums, wij, row_sums)
                 nodal_sums = multiply_add4(nodal_sums, wij, row_nodal)
                 slip_squared += wij * row_squared
-                divergence += gx * row_sums[0] + gy * row_sums[1] + wij * row_across[2]
-                if wp.static(reprojected):
-                    second_divergence += gx * row_nodal[0] + gy * row_nodal[1] + wij * nodal_across[2]
-                if wp.static(end):
+                if wp.static(reprojected and not damped):
+                    divergence += gx * row_nodal[0] + gy * row_nodal[1] + wij * nodal_across[2]
+                else:
+                    divergence += gx * row_sums[0] + gy * row_sums[1] + wij * row_across[2]
+                if wp.static(reprojected or end):
                     second_divergence += gx * row_sums[4] + gy * row_sums[5] + wij * row_across[6]
         result = StrainIncrement()
-        result.motion = vector3(sums[0], sums[1], sums[2]) + dt * vector3(sums[4], sums[5], sums[6])
+        result.motion = vector3(sums[0], sums[1], sums[2])
+        if wp.static(not reprojected):
+            result.motion += dt * vector3(sums[4], sums[5], sums[6])
         result.divergence = divergence
         result.work_divergence = divergence
         if wp.static(reprojected):
-            result.divergence = second_divergence
-            result.work_divergence = HALF * (divergence + second_divergence)
+            result.work_divergence = second_divergence
         if wp.static(end):
             result.divergence = divergence + dt * second_divergence
             result.work_divergence = divergence + HALF * dt * second_divergence
         result.slip = vector3(nodal_sums[0], nodal_sums[1], nodal_sums[2]) - velocity
         result.slip_squared = slip_squared
         result.heat = nodal_sums[3]
-        result.filling = sums[7]
         return result
 
     return gather_strain
@@ -257,8 +256,8 @@ def damping_heat(strain: StrainIncrement, alpha: scalar) -> scalar:
 
 @wp.func
 def relax_density(density: scalar, filling: scalar, crossing: scalar) -> scalar:
-    """Relax a volume to what the nodes have room for: rho J^(a / (1 + a)), a = 0.1 dt c / h, not at free surfaces."""
-    rate = RELAXATION * crossing * wp.clamp((filling - SPARSE) / (FILLED - SPARSE), ZERO, ONE)
+    """Relax a volume to what the cells have room for: rho J^(a / (1 + a)), a = 0.3 dt c / h, not at free surfaces."""
+    rate = RELAXATION * crossing * inside(filling)
     return density * wp.pow(wp.max(filling, HALF), rate / (ONE + rate))
 
 
@@ -314,7 +313,7 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
             wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
             energy = ZERO
 
-        # Density follows the strain, and in full nodes relaxes to the room there is.
+        # Density follows the strain, and in full cells relaxes to the room there is.
         density = particles.density[p] / (ONE + dt * strained.divergence)
         burnt = ONE
         if wp.static(burns):
@@ -323,7 +322,8 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         if wp.static(damped) and burnt > BURNT_OUT and ambient_pressure == ZERO:
             sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
             onset = (burnt - BURNT_OUT) / (ONE - BURNT_OUT)
-            density = relax_density(density, strained.filling, onset * dt * sound_speed / viscosity.length)
+            filling = gather_filling(grid, cell, fraction)
+            density = relax_density(density, filling, onset * dt * sound_speed / viscosity.length)
 
         moved = ZERO
         if wp.static(move):

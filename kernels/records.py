@@ -39,9 +39,13 @@ class Particles:
 class Grid:
     """The background grid. Nodal quantities turn in place from sums into values (see `grid.py`)."""
 
-    node: wp.array(dtype=vector8)  # momentum, mass, force, volume -> velocity, mass, acceleration, filling
+    node: wp.array(dtype=vector8)  # momentum, mass, force, volume -> velocity, mass, acceleration, filling; and for
+    # the material update of MUSL: velocity that moves the particles, mass, velocity that does the work, filling
     pressure: wp.array(dtype=scalar)  # sum of w V p [J] -> field pressure [Pa]
+    cell_filling: wp.array(dtype=scalar)  # of cells: sum of L V [m3] -> filling (see `filling.py`)
     reprojected: wp.array(dtype=vector4)  # momentum, kinetic energy -> velocity, heat of the damping [J/kg]
+    kick: wp.array(dtype=vector8)  # sharpened acceleration in the lanes of `node`; then what `node` holds for the
+    # material update, not yet sharpened (see `sharpen.py`)
     cells: wp.vec3i  # cells of the domain per axis
     stride_x: int  # flat index step of a node along x
     stride_y: int  # along y; along z it is 1

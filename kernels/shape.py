@@ -25,6 +25,7 @@ class Shape:
     weight: wp.Function  # (distance, half_width) -> scalar
     slope: wp.Function  # (distance, half_width) -> scalar, derivative of the weight by the distance
     affine: wp.Function  # (distance, half_width, fraction) -> scalar
+    spread: float  # second moment of the weights [cells^2] that sharpening takes back (see `sharpen.py`)
 
 
 @wp.func
@@ -113,8 +114,12 @@ def gimp_affine(distance: scalar, half_width: scalar, fraction: scalar) -> scala
     return -gimp_weight(distance, half_width) * distance / moment
 
 
-LINEAR = Shape("linear", 2, offset_lower_node, linear_weight, linear_slope, linear_affine)
-GIMP = Shape("gimp", 3, offset_nearest_node, gimp_weight, gimp_slope, gimp_affine)
-BSPLINE = Shape("bspline", 3, offset_nearest_node, bspline_weight, bspline_slope, bspline_affine)
+LINEAR = Shape(
+    "linear", 2, offset_lower_node, linear_weight, linear_slope, linear_affine, 0.0
+)  # its forces jump from cell to cell: not sharpened
+GIMP = Shape(
+    "gimp", 3, offset_nearest_node, gimp_weight, gimp_slope, gimp_affine, 3.0 / 16.0
+)  # 1/6 + l^2/3, 2 particles an axis
+BSPLINE = Shape("bspline", 3, offset_nearest_node, bspline_weight, bspline_slope, bspline_affine, 1.0 / 4.0)
 
 SHAPES = (LINEAR, GIMP, BSPLINE)

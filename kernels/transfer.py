@@ -9,6 +9,7 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.blocks import stamp_blocks
+from warp_mpm.kernels.filling import lowest_cell, scatter_filling
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
@@ -92,15 +93,15 @@ def node_offset_function(shape: Shape) -> wp.Function:
 
 
 @functools.cache
-def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool) -> wp.Kernel:
+def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, filling: bool) -> wp.Kernel:
     """Particles -> nodes: momentum, mass and volume (`momentum`); internal force and field pressure (`force`).
 
-    sum w m, sum w m v (APIC: v + C (x_i - x_p)), sum w V; f = sum (p + q - p_ambient) V grad w, sum w V p.
+    sum w m, sum w m v (APIC: v + C (x_i - x_p)), sum w V; f = sum (p + q - p_ambient) V grad w, sum w V p; and to the
+    cells sum L V (`filling`).
     """
     width = shape.width
     first_node, weights, slopes, _ = stencil_functions(shape)
     node_offset = node_offset_function(shape)
-    lowest_node = lowest_node_function(shape)
 
     @wp.kernel(enable_backward=False, module="unique")
     def scatter(
@@ -120,7 +121,7 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool) -> w
         wx = weights(fraction[0], half_width)
         wy = weights(fraction[1], half_width)
         wz = weights(fraction[2], half_width)
-        stamp_blocks(grid, lowest_node(particles.cell[p], fraction), width, clock[0].step)
+        stamp_blocks(grid, lowest_cell(particles.cell[p], fraction), clock[0].step)
         volume = mass / particles.density[p]
         carried = mass * particles.velocity[p]
         pressure_volume = particles.pressure[p] * volume
@@ -148,16 +149,19 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool) -> w
                         value = multiply_add8(value, sz[k], across)
                         wp.atomic_add(grid.pressure, row + k, wij * wz[k] * pressure_volume)
                     scatter_add8(grid.node, row + k, ONE, value)
+        if wp.static(filling):
+            scatter_filling(grid, particles.cell[p], fraction, volume)
 
     return scatter
 
 
 @functools.cache
-def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool) -> wp.Kernel:
+def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sharpened: bool) -> wp.Kernel:
     """Nodes -> particle velocity, and for MUSL back again (`reproject`).
 
     FLIP: v += dt sum w a. With `blend` a share s of PIC: (1 - s)(v + dt a) + s sum w (v + dt a)_i; APIC is s = 1 and
-    C = sum (v + dt a)_i (x_i - x_p)^T w / D. Re-projection: sum w m v and, for the damping, sum w m v^2 / 2.
+    C = sum (v + dt a)_i (x_i - x_p)^T w / D. Re-projection: sum w m v and, for the damping, sum w m v^2 / 2. With
+    `sharpened`, which does not go with the other two, a comes from `kick`.
     """
     width = shape.width
     first_node, weights, _, affine_weights = stencil_functions(shape)
@@ -189,9 +193,12 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool) -> 
                 row = first + i * grid.stride_x + j * grid.stride_y
                 row_sums = vector8()
                 for k in range(width):
-                    node = grid.node[row + k]
-                    row_sums = multiply_add8(row_sums, wz[k], node)
+                    if wp.static(sharpened):
+                        row_sums = multiply_add8(row_sums, wz[k], grid.kick[row + k])
+                    else:
+                        row_sums = multiply_add8(row_sums, wz[k], grid.node[row + k])
                     if wp.static(affine):
+                        node = grid.node[row + k]
                         bx = affine_weights(fraction[0], half_width)[i] * wy[j] * wz[k] / grid.spacing[0]
                         by = wx[i] * affine_weights(fraction[1], half_width)[j] * wz[k] / grid.spacing[1]
                         bz = wx[i] * wy[j] * affine_weights(fraction[2], half_width)[k] / grid.spacing[2]

@@ -25,7 +25,6 @@ def scene(*, cell_size: float = 3e-3, particles_per_axis: int = 2) -> Scene:
     builder.walls(Walls(x_low=Wall.OPEN))
     builder.charge(column, explosive, particles_per_axis=particles_per_axis, name="column")
     builder.detonator(PlaneDetonator((0.0, 0.0, 0.0), normal=(1.0, 0.0, 0.0)))
-    builder.burn_width(3.0)
     builder.front_path((0.0, edge / 2, edge / 2), (RUN, edge / 2, edge / 2))
     builder.line((0.0, edge / 2, edge / 2), (LENGTH, edge / 2, edge / 2))
     builder.end_time(RUN / speed)

@@ -19,7 +19,7 @@ from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.materials import Material, ammonium_nitrate
 from warp_mpm.model import build_model
-from warp_mpm.scene import Scene, Vector, Wall, Walls
+from warp_mpm.scene import Domain, Scene, Vector, Wall, Walls
 from warp_mpm.solver import Solver
 from warp_mpm.state import State
 
@@ -129,8 +129,17 @@ def nodes(solver: Solver) -> np.ndarray:
     return solver.state.grid.node.numpy().copy().reshape(*shape, 8)
 
 
+def cell_filling(solver: Solver) -> np.ndarray:
+    """Copy of the filling of all cells (nx + 3, ny + 3, nz + 3), ghosts included, in double; after a scatter, volumes.
+
+    Cell (i, j, k) of the domain is at [i + 1, j + 1, k + 1]; the last layer along every axis is no cell.
+    """
+    shape = tuple(n + 3 for n in solver.model.scene.domain.cells)
+    return solver.state.grid.cell_filling.numpy().reshape(shape).astype(np.float64)
+
+
 def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
-    """Scatter all particles onto an empty grid, without solving it.
+    """Scatter all particles onto an empty grid, without solving it; the cells' volumes too if the solver does.
 
     Returns:
         Node sums (nx + 3, ny + 3, nz + 3, 8), momentum, mass, force, volume, and sum w V p (nx + 3, ...), in double.
@@ -138,11 +147,43 @@ def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
     state, model = solver.state, solver.model
     state.grid.node.zero_()
     state.grid.pressure.zero_()
-    kernel = transfer.scatter_kernel(model.shape, True, True, model.affine)
+    state.grid.cell_filling.zero_()
+    kernel = transfer.scatter_kernel(model.shape, True, True, model.affine, model.damped)
     inputs = [state.particles, state.grid, state.clock, model.charges[0].half_width, model.scene.ambient_pressure, 0]
     wp.launch(kernel, state.count, inputs=inputs, device=state.device)
     sums = nodes(solver).astype(np.float64)
     return sums, state.grid.pressure.numpy().reshape(sums.shape[:3]).astype(np.float64)
+
+
+def tent_sums(domain: Domain, position: np.ndarray, carried: np.ndarray) -> np.ndarray:
+    """What particles at positions (n, 3) carry (n,), shared out among the cells by tents at their centres, in double.
+
+    Returns:
+        Sums (nx + 3, ny + 3, nz + 3), laid out as `cell_filling`; what fell behind faces is still in the ghosts.
+    """
+    place = (position - domain.lower) / domain.spacing
+    sums = np.zeros(tuple(n + 3 for n in domain.cells))
+    nearest = np.floor(place).astype(int)
+    for shift in itertools.product((-1, 0, 1), repeat=3):  # the cell a particle is in, and all its neighbours
+        cell = nearest + shift
+        weights = np.maximum(1.0 - np.abs(place - (cell + 0.5)), 0.0).prod(axis=1)
+        np.add.at(sums, tuple((cell + 1).T), weights * carried)
+    return sums
+
+
+def mirrored_cells(sums: np.ndarray, walls: Walls) -> np.ndarray:
+    """Cell sums with the ghosts behind walls added to the cells that they mirror, and then set equal to them."""
+    faces = walls.faces()
+    for axis in range(3):
+        sums = np.moveaxis(sums, axis, 0).copy()
+        ends = [(0, 1, faces[2 * axis]), (-2, -3, faces[2 * axis + 1])]
+        mirrors = [(ghost, cell) for ghost, cell, wall in ends if wall is not Wall.OPEN]
+        for ghost, cell in mirrors:
+            sums[cell] += sums[ghost]
+        for ghost, cell in mirrors:
+            sums[ghost] = sums[cell]
+        sums = np.moveaxis(sums, 0, axis)
+    return sums
 
 
 def particle_values(state: State) -> dict[str, np.ndarray]:

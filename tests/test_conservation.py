@@ -170,11 +170,12 @@ def test_ambient_pressure_does_work(transfer, walls, device):
 def test_ambient_work_is_pressure_times_volume(transfer, device):
     """W_ambient = p_ambient (V(t) - V(0)), to the first order of the time step: a third of it, a third of the error.
 
-    The density takes another velocity than the work does (`kernels/material.py`), and both are those of a step.
+    The density takes another velocity than the work does (`kernels/material.py`), and both are those of a step. Steps
+    are short enough for the burn, half a cell wide by default, to take several.
     """
     ambient, errors = 2e8, []
     scene = block(BLOCK, walls=OPEN, margin_cells=12, ambient_pressure=ambient, end_time=43e-6)
-    for cfl in (0.3, 0.1):
+    for cfl in (0.1, 0.1 / 3.0):
         solver = start(scene, device, transfer=transfer, cfl=cfl)
         before = totals_of(solver)
         while float(solver.state.clock_values()["time"]) < scene.end_time:
@@ -182,7 +183,7 @@ def test_ambient_work_is_pressure_times_volume(transfer, device):
         after = totals_of(solver)
         assert after.volume > 2.0 * before.volume
         errors.append(after.ambient_work / (ambient * (after.volume - before.volume)) - 1.0)
-    assert abs(errors[0]) < 0.02
+    assert abs(errors[0]) < 0.007  # 0.02 at the default, three times as long a step
     assert abs(errors[1]) < 0.5 * abs(errors[0])
 
 

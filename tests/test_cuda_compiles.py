@@ -3,21 +3,25 @@
 import pytest
 import warp as wp
 
-from warp_mpm.kernels import grid, material, reduce, shape, transfer
+from warp_mpm.kernels import grid, material, reduce, shape, sharpen, transfer
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.kernels.initial_strain import initial_strain_kernel
 
 ARCHITECTURE = 75  # the oldest that current Warp supports
 
 KERNELS = {
-    "scatter": lambda: transfer.scatter_kernel(shape.BSPLINE, True, True, False),
-    "advance": lambda: transfer.advance_kernel(shape.BSPLINE, False, False, True),
+    "scatter": lambda: transfer.scatter_kernel(shape.BSPLINE, True, True, False, True),
+    "advance": lambda: transfer.advance_kernel(shape.BSPLINE, False, False, True, True),
     "update": lambda: material.update_kernel(
         shape.BSPLINE, material.Strain.REPROJECTED, True, True, IdealGas, ProgrammedBurn
     ),
-    "solve": lambda: grid.solve_kernel(True, True),
-    "solve_reprojected": lambda: grid.solve_reprojected,
+    "solve": lambda: grid.solve_kernel(True, True, True),
+    "solve_reprojected": lambda: grid.solve_reprojected_kernel(True),
+    "sharpen_acceleration": sharpen.sharpen_acceleration_kernel,
+    "sharpen_velocity": sharpen.sharpen_velocity_kernel,
     "start_step": lambda: reduce.start_step,
+    "initial_strain": lambda: initial_strain_kernel(shape.BSPLINE),
 }
 
 

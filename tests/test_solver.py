@@ -12,6 +12,7 @@ from scenes_for_tests import (
     advance,
     audited,
     block,
+    cell_filling,
     explosive,
     inert_gas,
     nodes,
@@ -70,6 +71,7 @@ def run_on(threads, **config):
     bits = particle_values(state)
     bits["memory order"] = state.particles.index.numpy().copy()
     bits["field pressure"] = state.field_pressure().copy()
+    bits["cells' filling"] = cell_filling(solver)
     bits["clock"] = np.array(list(state.clock_values()))
     bits["impulse"] = totals.wall_impulse
     bits["sums"] = np.array([totals.kinetic, totals.internal, totals.grid_mass, totals.energy_out, *totals.momentum])
@@ -156,13 +158,15 @@ def test_memory_is_ordered_by_slab_charge_and_cell(device):
     assert state.ranges[..., 1].sum() == state.count
 
 
-def test_the_grid_works_only_where_particles_are(device):
+@pytest.mark.parametrize("shape", [ShapeFunction.BSPLINE, ShapeFunction.LINEAR], ids=["bspline", "linear"])
+def test_the_grid_works_only_where_particles_are(shape, device):
     """Blocks of 4 x 4 x 4 nodes are active, and hold values, next to particles alone: nothing spreads along walls.
 
-    A stencil of three nodes, and the ghosts of its nodes, reach one block on from that of its lowest node.
+    A stencil of three nodes, and the ghosts of its nodes, reach one block on from that of its lowest node; so do the
+    cells around a particle.
     """
     scene = block((4, 4, 4), margin_cells=(0, 40, 0, 30, 0, 20))
-    solver = start(scene, device)
+    solver = start(scene, device, shape=shape)
     for _ in range(3):
         advance(solver, 25)
         state = solver.state
@@ -170,7 +174,8 @@ def test_the_grid_works_only_where_particles_are(device):
         held = np.unique(lowest // 4, axis=0)
         stamps = state.grid.stamps.numpy().reshape(tuple(state.grid.blocks))
         active = np.argwhere(stamps == int(state.clock_values()["step"]))
-        used = np.unique(np.argwhere(np.abs(nodes(solver)).sum(axis=-1) > 0.0) // 4, axis=0)
+        values = np.abs(nodes(solver)).sum(axis=-1) + cell_filling(solver)
+        used = np.unique(np.argwhere(values > 0.0) // 4, axis=0)
         for blocks in (active, used):
             steps = blocks[:, None] - held
             near = np.all((steps >= 0) & (steps <= 1), axis=-1).any(axis=1)

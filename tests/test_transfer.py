@@ -13,12 +13,23 @@ import functools
 import numpy as np
 import pytest
 import warp as wp
-from scenes_for_tests import CELL, OPEN, ROUND_OFF, block, inert_gas, nodes, particle_values, scatter, start
+from scenes_for_tests import (
+    CELL,
+    OPEN,
+    ROUND_OFF,
+    block,
+    cell_filling,
+    inert_gas,
+    nodes,
+    particle_values,
+    scatter,
+    start,
+)
 
 from warp_mpm.config import Order, ShapeFunction, Transfer
-from warp_mpm.kernels import material, transfer, vectors
+from warp_mpm.kernels import material, transfer
 from warp_mpm.kernels.motion import move_kernel
-from warp_mpm.kernels.precision import scalar, vector4, vector8
+from warp_mpm.kernels.precision import scalar
 from warp_mpm.kernels.records import Clock
 from warp_mpm.state import LAST_FRACTION
 
@@ -87,7 +98,7 @@ def gather(solver, affine=False):
     """Let the particles take the nodes' velocity over: PIC, or APIC with its gradient."""
     state, model = solver.state, solver.model
     set_time_step(state)
-    kernel = transfer.advance_kernel(model.shape, True, affine, False)
+    kernel = transfer.advance_kernel(model.shape, True, affine, False, False)
     inputs = [state.particles, state.grid, state.clock, model.charges[0].half_width, 1.0, 0]
     wp.launch(kernel, state.count, inputs=inputs, device=state.device)
 
@@ -101,7 +112,10 @@ def assert_sums_agree(actual, expected, terms):
 @shapes
 @pytest.mark.parametrize("affine", [False, True], ids=["flip", "apic"])
 def test_scatter_conserves_mass_momentum_and_volume(shape, affine, device):
-    """Sum over nodes of sum w m, w m v, w V = sum over particles: partition of unity; the affine part adds nothing."""
+    """Sum over nodes of sum w m, w m v, w V = sum over particles: partition of unity; the affine part adds nothing.
+
+    So is the sum over cells of sum L V, which only the damping's relaxation needs.
+    """
     solver = cloud(shape, device, transfer=Transfer.APIC if affine else Transfer.FLIP)
     if affine:
         gradient = np.random.default_rng(3).normal(0.0, 1e4, (solver.state.count, 3, 3))
@@ -114,7 +128,12 @@ def test_scatter_conserves_mass_momentum_and_volume(shape, affine, device):
     # The affine terms cancel in the sum, but each is as large as m |C| times a cell's diagonal.
     carried = np.abs(momentum) + (mass[:, None] * 3 * 1e4 * CELL if affine else 0.0)
     assert_sums_agree(sums[:, 0:3].sum(axis=0), momentum.sum(axis=0), carried)
-    assert_sums_agree(sums[:, 7].sum(), (mass / values["density"]).sum(), sums[:, 7])
+    volume = (mass / values["density"]).sum()
+    assert_sums_agree(sums[:, 7].sum(), volume, sums[:, 7])
+    assert not cell_filling(solver).any()
+    damped = cloud(shape, device)
+    scatter(damped)
+    assert_sums_agree(cell_filling(damped).sum(), volume, cell_filling(damped).ravel())
 
 
 @shapes
@@ -201,15 +220,14 @@ def strain_kernel(shape, strain, damped):
         rows[p, 7] = s.work_divergence
         rows[p, 8] = s.slip_squared
         rows[p, 9] = s.heat
-        rows[p, 10] = s.filling
 
     return evaluate
 
 
 def strains(solver, strain, damped):
-    """Rows of the strain increments (n, 11) in creation order, in double."""
+    """Rows of the strain increments (n, 10) in creation order, in double."""
     state, model = solver.state, solver.model
-    rows = wp.zeros((state.count, 11), dtype=scalar, device=state.device)
+    rows = wp.zeros((state.count, 10), dtype=scalar, device=state.device)
     inputs = [state.particles, state.grid, model.charges[0].half_width, DT, rows]
     wp.launch(strain_kernel(model.shape, strain, damped), state.count, inputs=inputs, device=state.device)
     return state.in_creation_order(rows.numpy().astype(np.float64))
@@ -217,18 +235,16 @@ def strains(solver, strain, damped):
 
 @shapes
 def test_strain_of_affine_fields(shape, device):
-    """Div of v^n = a + B x and of re-projected v_r = 3 v^n is tr B and 3 tr B; the work takes their mean.
+    """v = a + B x moves the particles, 2 v does the work, 3 v is re-projected: divergences tr B, 2 tr B and 3 tr B.
 
-    With the damping: u = sum w (v_r - v_p), sum w |v_r - v_p|^2 >= |u|^2 (Jensen), heat and filling are sums w H.
+    With the damping the volume follows the motion, without it the re-projected velocity; u = sum w (v_r - v_p), sum w
+    |v_r - v_p|^2 >= |u|^2 (Jensen), the heat is sum w H. USF takes v^n for everything, USL v^n + dt a and, for the
+    work, v^n + dt a / 2.
     """
     solver = cloud(shape, device)
     place = node_positions(solver)
     velocity = affine_field(place)
-    acceleration = velocity / DT
-    set_nodes(solver, velocity, acceleration)
-    nodal = solver.state.grid.node.numpy().copy()
-    nodal[:, 7] = 0.75
-    solver.state.grid.node.assign(nodal)
+    set_nodes(solver, velocity, 2.0 * velocity)
     reprojected = np.concatenate([3.0 * velocity, np.full((len(velocity), 1), 7.0)], axis=1)
     solver.state.grid.reprojected.assign(reprojected.astype(np.float32))
     values = particle_values(solver.state)
@@ -238,8 +254,8 @@ def test_strain_of_affine_fields(shape, device):
     slope_round_off = SUMMED * fastest / CELL
 
     rows = strains(solver, material.Strain.REPROJECTED, True)
-    np.testing.assert_allclose(rows[:, 0:3], 2.0 * here, rtol=0, atol=SUMMED * fastest)
-    np.testing.assert_allclose(rows[:, 6], 3.0 * trace, rtol=0, atol=slope_round_off)
+    np.testing.assert_allclose(rows[:, 0:3], here, rtol=0, atol=SUMMED * fastest)
+    np.testing.assert_allclose(rows[:, 6], trace, rtol=0, atol=slope_round_off)
     np.testing.assert_allclose(rows[:, 7], 2.0 * trace, rtol=0, atol=slope_round_off)
     slip = 3.0 * here - values["velocity"]
     np.testing.assert_allclose(rows[:, 3:6], slip, rtol=0, atol=SUMMED * fastest)
@@ -247,8 +263,12 @@ def test_strain_of_affine_fields(shape, device):
     assert np.all(rows[:, 8] >= squared - SUMMED * fastest**2)
     assert np.any(rows[:, 8] > squared + (3.0 * np.abs(AFFINE_GRADIENT).max() * 0.1 * CELL) ** 2)
     np.testing.assert_allclose(rows[:, 9], 7.0, rtol=SUMMED)
-    np.testing.assert_allclose(rows[:, 10], 0.75, rtol=SUMMED)
 
+    undamped_rows = strains(solver, material.Strain.REPROJECTED, False)
+    np.testing.assert_allclose(undamped_rows[:, 6], 3.0 * trace, rtol=0, atol=slope_round_off)
+    np.testing.assert_allclose(undamped_rows[:, 7], 2.0 * trace, rtol=0, atol=slope_round_off)
+
+    set_nodes(solver, velocity, velocity / DT)
     start_rows = strains(solver, material.Strain.START, False)
     np.testing.assert_allclose(start_rows[:, 6:8], trace, rtol=0, atol=slope_round_off)
     end_rows = strains(solver, material.Strain.END, False)
@@ -358,43 +378,3 @@ def test_apic_conserves_angular_momentum_both_ways(shape, device):
     on_particles, size = angular_momentum(solver, after, affine)
     # A gradient is w v / h over the second moment, and those of the linear shape vanish towards a node.
     np.testing.assert_allclose(on_particles, on_nodes, rtol=0, atol=SUMMED * size)
-
-
-@functools.cache
-def vector_kernel(lanes):
-    """Kernel that applies the multiply-add and the scatter of `vectors.py` to rows."""
-    vector = vector4 if lanes == 4 else vector8
-    multiply_add = vectors.multiply_add4 if lanes == 4 else vectors.multiply_add8
-    scatter_add = vectors.scatter_add4 if lanes == 4 else vectors.scatter_add8
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def evaluate(
-        totals: wp.array(dtype=vector),
-        weights: wp.array(dtype=scalar),
-        values: wp.array(dtype=vector),
-        results: wp.array(dtype=vector),
-        nodes: wp.array(dtype=vector),
-    ):
-        n = wp.tid()
-        results[n] = multiply_add(totals[n], weights[n], values[n])
-        scatter_add(nodes, n, weights[n], values[n])
-
-    return evaluate
-
-
-@pytest.mark.parametrize("lanes", [4, 8])
-def test_vector_operations_equal_numpy(lanes, device):
-    """Total + weight value, in every lane; a fused multiply-add saves one of the two roundings."""
-    vector = vector4 if lanes == 4 else vector8
-    random = np.random.default_rng(6)
-    totals, values = random.normal(0.0, 1e3, (2, 100, lanes)).astype(np.float32)
-    weights = random.normal(0.0, 1.0, 100).astype(np.float32)
-    results = wp.zeros(100, dtype=vector, device=device)
-    target = wp.array(totals, dtype=vector, device=device)
-    given = [wp.array(totals, dtype=vector, device=device), wp.array(weights, device=device)]
-    inputs = [*given, wp.array(values, dtype=vector, device=device), results, target]
-    wp.launch(vector_kernel(lanes), 100, inputs=inputs, device=device)
-    product = weights[:, None].astype(np.float64) * values
-    rounding = 2 * ROUND_OFF * (np.abs(totals) + np.abs(product))
-    for computed in (results.numpy(), target.numpy()):
-        assert np.all(np.abs(computed - (totals + product)) <= rounding)

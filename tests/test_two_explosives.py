@@ -9,7 +9,7 @@ from warp_mpm.summary import lit_explosive
 CELL = 0.01  # [m]
 
 
-def two_explosives(path: tuple[float, float] | None, end_time: float = 12e-6) -> mpm.Scene:
+def two_explosives(path: tuple[float, float] | None, end_time: float = 12e-6, fast_time: float = 0.0) -> mpm.Scene:
     """A fast explosive (x < 0.1 m) beside a slow one, each lit at its own end; the path runs along x."""
     builder = mpm.SceneBuilder("pair")
     builder.domain((0.0, 0.0, 0.0), (0.2, 0.02, 0.02), cell_size=CELL)
@@ -18,7 +18,7 @@ def two_explosives(path: tuple[float, float] | None, end_time: float = 12e-6) ->
             name, density=1000.0, detonation_speed=speed, equation_of_state=mpm.IdealGas(gamma=3.0)
         )
         builder.charge(mpm.Box((start, 0.0, 0.0), (start + 0.1, 0.02, 0.02)), material, name=name)
-    builder.detonator(mpm.PlaneDetonator((0.0, 0.0, 0.0), normal=(1.0, 0.0, 0.0), charges=("fast",)))
+    builder.detonator(mpm.PlaneDetonator((0.0, 0.0, 0.0), normal=(1.0, 0.0, 0.0), time=fast_time, charges=("fast",)))
     builder.detonator(mpm.PlaneDetonator((0.2, 0.0, 0.0), normal=(1.0, 0.0, 0.0), time=1e-6, charges=("slow",)))
     builder.end_time(end_time)
     if path is not None:
@@ -32,15 +32,17 @@ def test_the_explosive_of_the_front_path(path, name):
 
 
 def test_figures_are_those_of_the_slow_explosive(device):
-    """The path lies in the slow one, 9 cells from its detonator: the speed is known to a cell in them.
+    """The path lies in the slow one, 9 cells from its detonator: the speed is known to a third of a cell in them.
 
-    A programmed burn's front stays below p_CJ; taken with the fast explosive's arrival times it would show nothing.
+    A programmed burn's front stays below p_CJ; taken with the fast explosive's arrival times it would show nothing. The
+    fast one is lit too late for its gas to come to the path.
     """
-    scene = two_explosives((0.2, 0.11), end_time=25e-6)
+    scene = two_explosives((0.2, 0.11), end_time=25e-6, fast_time=15e-6)
     summary = mpm.simulate(scene, save=mpm.Save(frames=2), device=device).summary
     assert summary["detonation_speed_m_s"] == 4000.0
     assert summary["p_cj_pa"] == pytest.approx(1000.0 * 4000.0**2 / 4.0, rel=1e-5)
-    assert summary["front_speed_m_s"] == pytest.approx(4000.0, rel=1.0 / 9.0)
+    assert summary["front_speed_m_s"] == pytest.approx(4000.0, rel=1.0 / 27.0)
+    assert summary["front_fit_residual_m"] < 0.1 * CELL
     assert 0.0 < summary["front_gauge_pressure_pa"] < summary["p_cj_pa"]
 
 

@@ -1,7 +1,7 @@
 """`SceneBuilder`: collects what a scene consists of, checks it, and cuts the charges into particles."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -112,13 +112,23 @@ class SceneBuilder:
 
     # ---- what it is, and what starts it ----------------------------------------------------------------------------
 
-    def charge(self, solid: Solid, material: Material, *, particles_per_axis: int = 2, name: str | None = None) -> None:
+    def charge(
+        self,
+        solid: Solid,
+        material: Material,
+        *,
+        particles_per_axis: int = 2,
+        velocity: Sequence[float] | Callable[[np.ndarray], np.ndarray] | None = None,
+        name: str | None = None,
+    ) -> None:
         """Add a body of one material.
 
         Args:
             solid: its shape.
             material: what it is made of.
             particles_per_axis: particles along each axis of every cell.
+            velocity: at the start [m/s]: one vector for all of it, or a function that turns positions (n, 3) [m] into
+                velocities (n, 3) [m/s] and is called by `build`; without one it is at rest.
             name: for detonators and messages; without one "charge_1", "charge_2", ...
 
         Raises:
@@ -131,7 +141,9 @@ class SceneBuilder:
         checks.instance(f"{here}: solid", solid, Solid, "a Solid, such as Box, Sphere or Cylinder")
         checks.instance(f"{here}: material", material, Material, "a Material")
         per_axis = checks.count(f"{here}: particles_per_axis", particles_per_axis)
-        self._bodies.append(Body(name, solid, material, per_axis))
+        if velocity is not None and not callable(velocity):
+            velocity = checks.vector(f"{here}: velocity", velocity)
+        self._bodies.append(Body(name, solid, material, per_axis, velocity))
 
     def detonator(self, detonator: Detonator) -> None:
         """Add a detonator. One that names no charges lights the charge it lies in.

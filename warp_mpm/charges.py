@@ -1,7 +1,7 @@
 """Cuts bodies into charges of particles, after checking that they fit the domain, the cells and the memory."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -11,12 +11,15 @@ from warp_mpm.checks import mistake
 from warp_mpm.geometry import Solid
 from warp_mpm.lattice import Lattice
 from warp_mpm.materials import Material
-from warp_mpm.scene import Charge, Domain
+from warp_mpm.scene import Charge, Domain, Vector
 from warp_mpm.volume import TARGET_TOLERANCE, measure_volume
 
 BYTES_PER_PARTICLE = 400  # positions while building, state, sorting and output together, rounded up
 LARGEST_VOLUME_DEVIATION = 0.2  # of a particle's volume from its lattice site's, before a warning
 OUTSIDE_TOLERANCE = 1e-9  # of the domain's size
+
+# An initial velocity: one for all particles, or a function of their positions, (n, 3) [m] to (n, 3) [m/s].
+Velocity = Vector | Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Body:
     solid: Solid
     material: Material
     particles_per_axis: int  # along each axis of every cell
+    velocity: Velocity | None = None  # at the start [m/s]; None: at rest
 
     @property
     def explosive(self) -> bool:
@@ -74,7 +78,8 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
     """The bodies, cut into particles on the lattices of the domain's cells.
 
     Raises:
-        InputError: one gets no particle, two overlap, or together they need more memory than the machine has.
+        InputError: one gets no particle, two overlap, a velocity function does not give three finite numbers for each
+            position, or together they need more memory than the machine has.
     """
     volumes = [measure_volume(body.solid) for body in bodies]
     lattices = [Lattice(domain, body.particles_per_axis) for body in bodies]
@@ -83,12 +88,12 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
     charges = []
     for body, (volume, tolerance), lattice in zip(bodies, volumes, lattices, strict=True):
         positions = lattice.sites_in(body.solid)
+        here = f"{where}: charge {body.name!r}"
         if len(positions) == 0:
-            raise mistake(
-                f"{where}: charge {body.name!r}", "at least one particle in it", "none", "choose a smaller cell size"
-            )
+            raise mistake(here, "at least one particle in it", "none", "choose a smaller cell size")
+        velocities = _initial_velocities(f"{here}: velocity", body.velocity, positions)
         per_axis = body.particles_per_axis
-        charges.append(Charge(body.name, body.solid, body.material, positions, volume, tolerance, per_axis))
+        charges.append(Charge(body.name, body.solid, body.material, positions, volume, tolerance, per_axis, velocities))
     for first, second in combinations(charges, 2):
         _check_apart(where, first, second)
     return tuple(charges)
@@ -117,6 +122,29 @@ def total_memory() -> int | None:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
         return None
+
+
+def _initial_velocities(where: str, velocity: Velocity | None, positions: np.ndarray) -> np.ndarray | None:
+    """Velocities (n, 3) float64 [m/s] of particles at `positions` (n, 3) [m]; None when all are at rest."""
+    if velocity is None:
+        return None
+    if not callable(velocity):
+        velocities = np.tile(np.array(velocity, dtype=float), (len(positions), 1))
+    else:
+        given = velocity(positions.copy())  # a copy: the function may work in place
+        expected = f"a function that turns positions {positions.shape} into finite velocities {positions.shape}"
+        try:
+            velocities = np.array(given, dtype=float)
+        except (TypeError, ValueError):
+            raise mistake(where, expected, f"one that returns {type(given).__name__}") from None
+        if velocities.shape != positions.shape:
+            raise mistake(where, expected, f"one that returns shape {velocities.shape}")
+        wrong = ~np.isfinite(velocities).all(axis=1)
+        if wrong.any():
+            first = int(np.argmax(wrong))
+            got, place = (", ".join(f"{value:g}" for value in row[first]) for row in (velocities, positions))
+            raise mistake(where, expected, f"one that returns ({got}) at ({place}) m")
+    return velocities if velocities.any() else None
 
 
 def _check_memory(where: str, particle_count: float) -> None:

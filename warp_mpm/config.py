@@ -46,7 +46,7 @@ class SolverConfig:
     order: Order = Order.MUSL
     transfer: Transfer = Transfer.DAMPED_FLIP
     pic_share: float = 0.0  # 0: pure FLIP, 1: pure PIC; with transfer=flip only
-    burn_width: float | None = None  # width of the burn zone [cells]; None: the scene's, else 3
+    burn_width: float | None = None  # width of the burn zone [cells]; None: the scene's, else 0.5
     viscosity: tuple[float, float] = (1.5, 0.06)  # quadratic and linear coefficient of the artificial viscosity
     cfl: float = 0.3  # Courant number of the time step
 

@@ -66,6 +66,10 @@ class Domain:
         x, y, z = ((b - a) / n for a, b, n in zip(self.lower, self.upper, self.cells, strict=True))
         return (x, y, z)
 
+    def centres(self, axis: int) -> np.ndarray:
+        """Coordinates of the cells' centres along an axis (cells,) [m]."""
+        return self.lower[axis] + (np.arange(self.cells[axis]) + 0.5) * self.spacing[axis]
+
     @property
     def cell_volume(self) -> float:
         """Volume of one cell [m3]."""
@@ -83,6 +87,7 @@ class Charge:
     volume: float  # [m3], exact where a formula exists
     volume_tolerance: float  # relative; 0 when the volume is exact
     particles_per_axis: int = 2  # along each axis of every cell
+    velocities: np.ndarray | None = None  # (n, 3) float64, initial [m/s]; None: at rest
 
     @property
     def particle_volume(self) -> float:
@@ -93,6 +98,11 @@ class Charge:
     def mass(self) -> float:
         """Mass of the charge [kg]."""
         return self.material.density * self.volume
+
+    @property
+    def greatest_speed(self) -> float:
+        """Initial speed of its fastest particle [m/s]."""
+        return 0.0 if self.velocities is None else float(np.linalg.norm(self.velocities, axis=1).max())
 
 
 @dataclass(frozen=True)

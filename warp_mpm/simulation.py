@@ -299,11 +299,14 @@ class _Run:
 
 
 def color_limit(scene: Scene) -> float:
-    """Pressure of the last colour [Pa]: 1.6 p_CJ shows fronts and collisions; without explosive, rho e."""
+    """Pressure of the last colour [Pa]: 1.6 p_CJ shows fronts and collisions.
+
+    Without explosive, the energy density rho (e + |v|^2 / 2) of the charge that has most of it at the start.
+    """
     material = lit_explosive(scene)
     if material is not None and material.cj is not None:
         return 1.6 * material.cj.pressure
-    return max(c.material.density * c.material.specific_energy for c in scene.charges)
+    return max(c.material.density * (c.material.specific_energy + 0.5 * c.greatest_speed**2) for c in scene.charges)
 
 
 def _charge_values(charge: Charge) -> dict[str, Any]:

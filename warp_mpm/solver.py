@@ -1,8 +1,8 @@
 """One step of the Material Point Method, as named phases.
 
-MUSL (the default): choose the time step | grid to particles, and their momentum back to the grid | strain, material
-and motion | particles to grid | solve the grid. The particles are scattered at the end of a step, so that the field
-pressure on the grid belongs to the same instant as the particles.
+MUSL (the default): choose the time step | sharpen the accelerations | grid to particles, and their momentum back to
+the grid | sharpen the velocities | strain, material and motion | particles to grid | solve the grid. The particles are
+scattered at the end of a step, so that the field pressure on the grid belongs to the same instant as the particles.
 """
 
 import itertools
@@ -14,8 +14,9 @@ import warp as wp
 
 from warp_mpm.config import Order
 from warp_mpm.kernels import grid as grid_kernels
-from warp_mpm.kernels import material, motion, reduce, transfer
+from warp_mpm.kernels import material, motion, reduce, sharpen, transfer
 from warp_mpm.kernels.blocks import NODES
+from warp_mpm.kernels.initial_strain import initial_strain_kernel
 from warp_mpm.launch import Launcher, Task
 from warp_mpm.model import LARGEST_DRIFT, STRAINS, ChargeModel, Model
 from warp_mpm.state import State
@@ -48,10 +49,14 @@ class Solver:
             self._over_slabs(self._advance)
             self._over_particles(self._move)
         else:
+            if self.model.damped:
+                self._over_nodes(self._sharpen_acceleration)
             self._collect_reactions.launch()
             self._over_slabs(self._advance)
             if self.model.config.order is Order.MUSL:
                 self._over_nodes(self._solve_reprojected)
+            if self.model.damped:
+                self._over_nodes(self._sharpen_velocity)
             self._over_particles(self._update)
             self._scatter(self._scatter_all)
             self._over_nodes(self._solve_all)
@@ -101,6 +106,11 @@ class Solver:
             )
         self._scatter(self._scatter_all)
         self._over_nodes(self._solve_all)
+        if any(charge.velocities is not None for charge in model.scene.charges):
+            kernel = initial_strain_kernel(model.shape)
+            for slab, charge, begin, count in self._groups():
+                inputs = [state.particles, state.grid, charge.half_width, state.maxima, slab, begin]
+                wp.launch(kernel, count, inputs=inputs, device=model.device)
         if model.config.order is Order.USF:  # which computes forces anew before it uses any
             state.reactions.zero_()
             state.pending_impulses.zero_()
@@ -157,12 +167,12 @@ class Solver:
         musl, usf = order is Order.MUSL, order is Order.USF
 
         def scatter(momentum: bool, force: bool) -> list[Task]:
-            kernel = transfer.scatter_kernel(shape, momentum, force, model.affine)
+            kernel = transfer.scatter_kernel(shape, momentum, force, model.affine, model.damped)
             return self._per_slab(
                 lambda slab, charge: (kernel, [state.particles, state.grid, state.clock, charge.half_width, ambient])
             )
 
-        advance = transfer.advance_kernel(shape, blend, model.affine, musl)
+        advance = transfer.advance_kernel(shape, blend, model.affine, musl, model.damped)
         self._advance = self._per_slab(
             lambda slab, charge: (
                 advance,
@@ -197,7 +207,7 @@ class Solver:
         state, model = self.state, self.model
 
         def solve(momentum: bool, force: bool) -> list[Task]:
-            kernel = grid_kernels.solve_kernel(momentum, force)
+            kernel = grid_kernels.solve_kernel(momentum, force, model.damped)
             walls = [state.reactions, state.pending_impulses, state.peaks]
             return self._per_slot(
                 kernel, lambda slot: [state.grid, model.boundary, state.clock, model.pic_share, *walls, slot]
@@ -209,8 +219,18 @@ class Solver:
             self._solve_momentum = solve(momentum=True, force=False)
             self._solve_force = solve(momentum=False, force=True)
         self._solve_reprojected = self._per_slot(
-            grid_kernels.solve_reprojected, lambda slot: [state.grid, model.boundary, state.clock, state.impulses, slot]
+            grid_kernels.solve_reprojected_kernel(model.damped),
+            lambda slot: [state.grid, model.boundary, state.clock, state.impulses, slot],
         )
+        if model.damped:
+            strength = 0.5 * model.shape.spread
+            self._sharpen_acceleration = self._per_slot(
+                sharpen.sharpen_acceleration_kernel(),
+                lambda slot: [state.grid, model.boundary, state.clock, strength, state.reactions, slot],
+            )
+            self._sharpen_velocity = self._per_slot(
+                sharpen.sharpen_velocity_kernel(), lambda slot: [state.grid, model.boundary, state.clock, strength]
+            )
 
     def _per_slab(self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]]) -> list[Task]:
         """One task for each slab, with one recorded launch for each charge that has particles there."""

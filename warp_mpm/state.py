@@ -3,7 +3,7 @@
 import numpy as np
 import warp as wp
 
-from warp_mpm.kernels import arrival, order
+from warp_mpm.kernels import arrival, grid, order
 from warp_mpm.kernels.blocks import EDGE, NODES
 from warp_mpm.kernels.precision import NEVER, matrix3, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import TALLIES, Clock, Grid, Maxima, Particles
@@ -122,8 +122,23 @@ class State:
 
     def field_pressure(self) -> np.ndarray:
         """Field pressure at the nodes of the domain (nx + 1, ny + 1, nz + 1) [Pa]; a view on a CPU."""
+        return self._in_the_domain(self.grid.pressure)
+
+    def field_density(self) -> np.ndarray:
+        """Density at the nodes of the domain (nx + 1, ny + 1, nz + 1) [kg/m3]."""
+        density = wp.zeros(tuple(n + 1 for n in self.model.scene.domain.cells), dtype=scalar, device=self.device)
+        wp.launch(grid.measure_density, density.shape, inputs=[self.grid, density], device=self.device)
+        return density.numpy()
+
+    def field_velocity(self) -> np.ndarray:
+        """Velocity at the nodes of the domain (nx + 1, ny + 1, nz + 1, 3) [m/s], 0 at empty ones; a view on a CPU."""
+        return self._in_the_domain(self.grid.node)[..., :3]
+
+    def _in_the_domain(self, nodal: wp.array) -> np.ndarray:
+        """What a nodal array holds at the nodes of the domain."""
+        values = nodal.numpy()
         shape = tuple(n + 3 for n in self.model.scene.domain.cells)
-        return self.grid.pressure.numpy().reshape(shape)[1:-1, 1:-1, 1:-1]
+        return values.reshape(shape + values.shape[1:])[1:-1, 1:-1, 1:-1]
 
     def _light(self) -> None:
         """Set arrival and booster times from the detonators; particles are in creation order here."""
@@ -144,7 +159,7 @@ class State:
 def memory_needed(model: Model) -> int:
     """Bytes that a state of this model takes on its device."""
     particle = 6 + 2 * 12 + 9 * 4 + 12 + 24 + (36 if model.affine else 0)
-    node = 8 * 4 + 4 + 4 * 4
+    node = 8 * 4 + 4 + 4 + 4 * 4 + (8 * 4 if model.damped else 0)
     nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
     return int(model.scene.particle_count * particle + nodes * node)
 
@@ -156,7 +171,9 @@ def _allocate_grid(model: Model) -> Grid:
     grid = Grid()
     grid.node = wp.zeros(total, dtype=vector8, device=model.device)
     grid.pressure = wp.zeros(total, dtype=scalar, device=model.device)
+    grid.cell_filling = wp.zeros(total, dtype=scalar, device=model.device)
     grid.reprojected = wp.zeros(total, dtype=vector4, device=model.device)
+    grid.kick = wp.zeros(total if model.damped else 0, dtype=vector8, device=model.device)
     blocks = [-(-n // EDGE) for n in counts]
     grid.stamps = wp.full(blocks[0] * blocks[1] * blocks[2], NO_STEP, dtype=int, device=model.device)
     grid.blocks = wp.vec3i(*blocks)
@@ -170,7 +187,7 @@ def _allocate_grid(model: Model) -> Grid:
 
 
 def _place_particles(model: Model) -> Particles:
-    """Particles in creation order, at rest, at their initial density and energy."""
+    """Particles in creation order, at their initial velocity, density and energy."""
     scene, device = model.scene, model.device
     positions = np.concatenate([charge.positions for charge in scene.charges])
     n = len(positions)
@@ -186,7 +203,8 @@ def _place_particles(model: Model) -> Particles:
     particles = Particles()
     particles.cell = wp.array(cell.astype(np.int16), dtype=wp.vec3s, device=device)
     particles.fraction = wp.array(fraction, dtype=vector3, device=device)
-    particles.velocity = wp.zeros(n, dtype=vector3, device=device)
+    velocities = [np.zeros_like(c.positions) if c.velocities is None else c.velocities for c in scene.charges]
+    particles.velocity = wp.array(np.concatenate(velocities).astype(np.float32), dtype=vector3, device=device)
     particles.affine = wp.zeros(n if model.affine else 0, dtype=matrix3, device=device)
     particles.mass = per_charge([c.material.density * c.particle_volume for c in scene.charges])
     particles.density = per_charge([c.material.density for c in scene.charges])

@@ -1,0 +1,132 @@
+"""How full the cells are, by the measure that the internal force goes by.
+
+    J_c = sum over particles of L(x_p - x_c) V_p / V_c,    L the tent function (linear weights), x_c the cell's centre
+
+The slope of the quadratic B-spline is a difference of two tents, dw_i/dx = (L(x - x_{i-1/2}) - L(x - x_{i+1/2})) / h.
+Along an axis the force f_i = sum V_p p_p dw_i/dx on a node is therefore exactly the difference of sum L V_p p_p / h
+between the two cells that meet there, and gas at rest has the same sum in all cells, however its particles lie. If the
+volumes fill every cell by the same tents, J_c = 1, then the particles' pressures are equal too; volumes that fill the
+nodes by the shape function itself leave a pattern of several per cent in them.
+
+A cell has the index of the node at its lower corner. What was scattered behind a wall is folded back into the cell in
+front of it, which is the mirror image of the one behind.
+"""
+
+import warp as wp
+
+from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector2, vector3
+from warp_mpm.kernels.records import Grid, node_index
+from warp_mpm.kernels.shape import linear_weight, offset_nearest_node
+from warp_mpm.kernels.walls import WALL_OPEN, Boundary, image_count, image_sides
+
+FULL = wp.constant(scalar(0.95))  # filling from which on a place is inside the material
+SPARSE = wp.constant(scalar(0.80))  # and up to which it is at a free surface
+
+
+@wp.func
+def inside(filling: scalar) -> scalar:
+    """1 inside the material, 0 at a free surface, by the filling of a cell or a node."""
+    return wp.clamp((filling - SPARSE) / (FULL - SPARSE), ZERO, ONE)
+
+
+@wp.func
+def lowest_cell(cell: wp.vec3s, fraction: vector3) -> wp.vec3i:
+    """The lowest of the eight cells whose centres surround a particle."""
+    return wp.vec3i(
+        int(cell[0]) + offset_nearest_node(fraction[0]),
+        int(cell[1]) + offset_nearest_node(fraction[1]),
+        int(cell[2]) + offset_nearest_node(fraction[2]),
+    )
+
+
+@wp.func
+def tents(fraction: scalar) -> vector2:
+    """Linear weights, along an axis, of the two cells whose centres surround a particle."""
+    distance = fraction - HALF - scalar(offset_nearest_node(fraction))
+    return vector2(linear_weight(distance, HALF), linear_weight(distance - ONE, HALF))
+
+
+@wp.func
+def scatter_filling(grid: Grid, cell: wp.vec3s, fraction: vector3, volume: scalar):
+    """Particle -> cells: sum L V [m3]."""
+    lowest = lowest_cell(cell, fraction)
+    first = node_index(grid, lowest[0], lowest[1], lowest[2])
+    wx = tents(fraction[0])
+    wy = tents(fraction[1])
+    wz = tents(fraction[2])
+    for i in range(2):
+        for j in range(2):
+            row = first + i * grid.stride_x + j * grid.stride_y
+            for k in range(2):
+                wp.atomic_add(grid.cell_filling, row + k, wx[i] * wy[j] * wz[k] * volume)
+
+
+@wp.func
+def gather_filling(grid: Grid, cell: wp.vec3s, fraction: vector3) -> scalar:
+    """Filling of the cells around a particle, interpolated: sum L J_c."""
+    lowest = lowest_cell(cell, fraction)
+    first = node_index(grid, lowest[0], lowest[1], lowest[2])
+    wx = tents(fraction[0])
+    wy = tents(fraction[1])
+    wz = tents(fraction[2])
+    filling = ZERO
+    for i in range(2):
+        for j in range(2):
+            row = first + i * grid.stride_x + j * grid.stride_y
+            for k in range(2):
+                filling += wx[i] * wy[j] * wz[k] * grid.cell_filling[row + k]
+    return filling
+
+
+@wp.func
+def owned_ghosts(boundary: Boundary, cells: wp.vec3i, cell: wp.vec3i) -> wp.vec3i:
+    """Per axis, which ghosts behind walls belong to a cell: 1 behind the low face, 2 behind the high one, 3 both."""
+    owned = wp.vec3i()
+    for axis in range(3):
+        if cell[axis] == 0 and boundary.wall[2 * axis] != WALL_OPEN:
+            owned[axis] = owned[axis] + 1
+        if cell[axis] == cells[axis] - 1 and boundary.wall[2 * axis + 1] != WALL_OPEN:
+            owned[axis] = owned[axis] + 2
+    return owned
+
+
+@wp.func
+def stands_for_itself(boundary: Boundary, cells: wp.vec3i, cell: wp.vec3i) -> bool:
+    """Whether there is such a cell, and it is no ghost behind a wall; those beyond open faces are free."""
+    stands = True
+    for axis in range(3):
+        if cell[axis] < 0 and boundary.wall[2 * axis] != WALL_OPEN:
+            stands = False
+        if cell[axis] == cells[axis] and boundary.wall[2 * axis + 1] != WALL_OPEN:
+            stands = False
+        if cell[axis] > cells[axis]:
+            stands = False
+    return stands
+
+
+@wp.func
+def image_cell(grid: Grid, cell: wp.vec3i, sides: wp.vec3i) -> int:
+    """Flat index of an image of a cell (see `walls.py`)."""
+    image = wp.vec3i(cell[0], cell[1], cell[2])
+    for axis in range(3):
+        if sides[axis] == 0:
+            image[axis] = -1
+        if sides[axis] == 1:
+            image[axis] = grid.cells[axis]
+    return node_index(grid, image[0], image[1], image[2])
+
+
+@wp.func
+def solve_cell(grid: Grid, boundary: Boundary, cell: wp.vec3i):
+    """Sum of the scatter -> filling of a cell, and of its ghosts behind walls."""
+    owned = owned_ghosts(boundary, grid.cells, cell)
+    total = ZERO
+    for i in range(image_count(owned[0])):
+        for j in range(image_count(owned[1])):
+            for k in range(image_count(owned[2])):
+                total += grid.cell_filling[image_cell(grid, cell, image_sides(owned, i, j, k))]
+    filling = total / (grid.spacing[0] * grid.spacing[1] * grid.spacing[2])
+    for i in range(image_count(owned[0])):
+        for j in range(image_count(owned[1])):
+            for k in range(image_count(owned[2])):
+                grid.cell_filling[image_cell(grid, cell, image_sides(owned, i, j, k))] = filling
