@@ -1,6 +1,7 @@
 """The command line `warp-mpm`.
 
-A user's mistake is one line on standard error and exit code 2; a run that cannot go on, code 1; an interrupt, 130.
+A user's mistake is one line on standard error and exit code 2; a run that cannot go on, or a broken bound of `verify`,
+code 1; an interrupt, 130.
 Modules that take long to import are imported where they are used: `list` and `--help` answer at once.
 """
 
@@ -13,7 +14,7 @@ from typing import NoReturn
 
 from warp_mpm.checks import count, mistake
 from warp_mpm.config import Save, SolverConfig
-from warp_mpm.errors import InputError, SimulationError
+from warp_mpm.errors import InputError, SimulationError, VerificationError
 from warp_mpm.parameters import annotations_of, from_text
 from warp_mpm.version import VERSION
 
@@ -32,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.command(options)
     except InputError as error:
         return _report(str(error), MISTAKE, words)
-    except (SimulationError, OSError) as error:
+    except (SimulationError, VerificationError, OSError) as error:
         return _report(str(error), FAILURE, words)
     except KeyboardInterrupt:
         return _report("interrupted; the frames written so far are kept", INTERRUPTED, words)
@@ -75,10 +76,8 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("scene", metavar="SCENE", help="a scene file, or a name that 'warp-mpm list' shows")
     run.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: out/<scene>)")
     _add_settings(run, "--set", "parameters of the scene, e.g. cell_size=6e-3 confinement=free")
-    _add_settings(run, "--solver", "settings of the solver, e.g. shape=linear viscosity=1.5,0.06")
     run.add_argument("--frames", type=int, default=Save().frames, help="saved frames (default: %(default)s)")
-    run.add_argument("--device", help="cpu, cuda:0, ... (default: the GPU if there is one)")
-    run.add_argument("--threads", type=int, help="threads on a CPU (default: one per core)")
+    _add_solving(run)
 
     scenes = commands.add_parser("list", parents=[common], help="list scenes", description="List scenes.")
     scenes.set_defaults(command=_list)
@@ -87,7 +86,35 @@ def _parser() -> argparse.ArgumentParser:
     info = commands.add_parser("info", parents=[common], help="describe a result", description="Describe a result.")
     info.set_defaults(command=_info)
     info.add_argument("path", metavar="PATH", type=Path, help="a run directory or a USD file")
+
+    text = "Solve problems with exact answers: error tables, pictures, and exit code 1 when a bound is broken."
+    check = commands.add_parser("verify", parents=[common], help="compare with exact solutions", description=text)
+    check.set_defaults(command=_verify)
+    check.add_argument("problems", metavar="PROBLEM", nargs="*", help="names that --list shows (default: all)")
+    check.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: out/verify)")
+    check.add_argument("--full", action="store_true", help="also the levels that take long (about 40 minutes)")
+    check.add_argument("--levels", metavar="N", type=int, help="the N coarsest levels of each problem instead")
+    check.add_argument("--list", action="store_true", help="list the problems and do nothing else")
+    _add_solving(check)
     return parser
+
+
+def _add_solving(parser: argparse.ArgumentParser) -> None:
+    """The options that say how something is solved."""
+    _add_settings(parser, "--solver", "settings of the solver, e.g. shape=linear viscosity=1.5,0.06")
+    parser.add_argument("--device", help="cpu, cuda:0, ... (default: the GPU if there is one)")
+    parser.add_argument("--threads", type=int, help="threads on a CPU (default: one per core)")
+
+
+def _solver_config(options: argparse.Namespace) -> SolverConfig:
+    """The solver settings of a command, after a look at its threads.
+
+    Raises:
+        InputError: a setting is unknown or out of range, or there is not at least one thread.
+    """
+    if options.threads is not None:
+        count("threads", options.threads)
+    return SolverConfig(**from_text(options.solver, annotations_of(SolverConfig, "solver"), "solver"))
 
 
 def _add_settings(parser: argparse.ArgumentParser, option: str, purpose: str) -> None:
@@ -110,9 +137,7 @@ def _run(options: argparse.Namespace) -> None:
     from warp_mpm.simulation import simulate
     from warp_mpm.warp_startup import start_quietly
 
-    if options.threads is not None:
-        count("threads", options.threads)
-    config = SolverConfig(**from_text(options.solver, annotations_of(SolverConfig, "solver"), "solver"))
+    config = _solver_config(options)
     save = Save(frames=options.frames)
     start_quietly()
     scene = load_scene_from_text(options.scene, options.set)
@@ -159,3 +184,30 @@ def _info(options: argparse.Namespace) -> None:
     from warp_mpm.output.info import describe
 
     print(describe(options.path))
+
+
+def _verify(options: argparse.Namespace) -> None:
+    """Solve problems with exact answers and judge the solver.
+
+    Raises:
+        InputError: unknown problem, wrong settings, device or output directory.
+        VerificationError: a bound is broken, or a run could not go on.
+    """
+    from warp_mpm.verification.command import print_problems, verify
+    from warp_mpm.verification.problems import all_problems
+    from warp_mpm.verification.session import Setup
+    from warp_mpm.warp_startup import start_quietly
+
+    start_quietly()
+    problems = all_problems()
+    if options.list:
+        print_problems(problems)
+        return
+    verify(
+        problems,
+        options.problems,
+        options.output if options.output is not None else Path("out") / "verify",
+        full=options.full,
+        coarsest=options.levels,
+        setup=Setup(_solver_config(options), options.device, options.threads),
+    )

@@ -10,3 +10,7 @@ class InputError(ValueError):
 
 class SimulationError(RuntimeError):
     """The run cannot go on: one line that says when, where, what happened, and what to try."""
+
+
+class VerificationError(RuntimeError):
+    """A verification problem's bound is broken: one line that names each, what was expected and what came."""
