@@ -33,7 +33,7 @@ from warp_mpm.kernels.transfer import stencil_functions
 from warp_mpm.kernels.vectors import multiply_add4, multiply_add8
 from warp_mpm.kernels.viscosity import Viscosity, viscous_pressure, viscous_rate
 
-RELAXATION = wp.constant(scalar(0.3))  # of the density towards full cells, per cell that sound crosses
+RELAXATION = wp.constant(scalar(0.6))  # of the density towards full cells, per cell that sound crosses
 # Where a wave arrives, whether a particle burns already is a matter of round-off: what a switch would turn into a jump
 # sets in over a short part of the burn instead, so that mirror images stay mirror images.
 IGNITED = wp.constant(scalar(0.1))  # burn fraction from which on the viscosity acts fully
@@ -256,7 +256,7 @@ def damping_heat(strain: StrainIncrement, alpha: scalar) -> scalar:
 
 @wp.func
 def relax_density(density: scalar, filling: scalar, crossing: scalar) -> scalar:
-    """Relax a volume to what the cells have room for: rho J^(a / (1 + a)), a = 0.3 dt c / h, not at free surfaces."""
+    """Relax a volume to what the cells have room for: rho J^(a / (1 + a)), a = 0.6 dt c / h, not at free surfaces."""
     rate = RELAXATION * crossing * inside(filling)
     return density * wp.pow(wp.max(filling, HALF), rate / (ONE + rate))
 

@@ -252,3 +252,12 @@ def test_progress_on_a_terminal(capsys):
         progress.update(1.0, 2.0, 7, "")
     progress.close()
     assert "sod: 200 cells" in capsys.readouterr().out
+
+
+def test_a_missed_aim_breaks_nothing():
+    """It is shown as missed; the same bound, not an aim, is broken."""
+    results = run_problem(Known(), [Level(8)], FAST).results
+    bound = Bound("pressure_l1", high=0.01)
+    assert judge(replace(bound, aim=True), results, {}).outcome is Outcome.MISSED
+    assert judge(bound, results, {}).outcome is Outcome.BROKEN
+    assert judge(replace(bound, high=0.2, aim=True), results, {}).outcome is Outcome.HELD

@@ -57,6 +57,7 @@ class Bound:
     why: str = ""  # where the number is from, in a few words
     from_cells: int = 0
     settings: Mapping[str, float] = field(default_factory=dict)  # empty: whatever the level's are
+    aim: bool = False  # where the solver should get to one day: a miss is shown, and breaks nothing
 
     def applies_to(self, level: Level) -> bool:
         """Whether this level is fine enough and has the bound's settings."""
@@ -204,6 +205,7 @@ class Outcome(Enum):
 
     HELD = "held"
     BROKEN = "broken"
+    MISSED = "missed"  # an aim
     NOT_MEASURED = "not measured"  # no level that was solved has the figure
 
 

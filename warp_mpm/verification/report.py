@@ -20,7 +20,12 @@ from warp_mpm.version import VERSION
 
 MILLIMETRE = 1e-3  # [m]
 SHORT = {"pressure": "p", "velocity": "u", "density": "rho"}
-COLORS = {Outcome.HELD: "green", Outcome.BROKEN: "bold red", Outcome.NOT_MEASURED: "yellow"}
+COLORS = {
+    Outcome.HELD: "green",
+    Outcome.BROKEN: "bold red",
+    Outcome.MISSED: "yellow",
+    Outcome.NOT_MEASURED: "yellow",
+}
 
 
 def settings_that_differ(config: SolverConfig) -> dict[str, Any]:
@@ -58,15 +63,18 @@ def print_problem(console: Console, report: ProblemReport) -> None:
 
 
 def print_verdict(console: Console, reports: Sequence[ProblemReport]) -> None:
-    """Print one line a problem: bounds that hold, seconds, verdict."""
-    table = _table("problem", "bounds held", "s", "verdict")
+    """Print one line a problem: bounds that hold, aims missed, seconds, verdict."""
+    table = _table("problem", "bounds held", "aims missed", "s", "verdict")
     for report in reports:
         held = sum(verdict.outcome is Outcome.HELD for verdict in report.verdicts)
-        measured = sum(verdict.outcome is not Outcome.NOT_MEASURED for verdict in report.verdicts)
+        missed = sum(verdict.outcome is Outcome.MISSED for verdict in report.verdicts)
+        measured = sum(verdict.outcome in (Outcome.HELD, Outcome.BROKEN) for verdict in report.verdicts)
         failed = bool(report.broken or report.failure)
         verdict = Text("BROKEN" if failed else "held", COLORS[Outcome.BROKEN if failed else Outcome.HELD])
         seconds = sum(result.seconds for result in report.results)
-        table.add_row(report.problem.name, f"{held} of {measured}", f"{seconds:.1f}", verdict)
+        table.add_row(
+            report.problem.name, f"{held} of {measured}", str(missed) if missed else "", f"{seconds:.1f}", verdict
+        )
     console.print()
     console.print(table)
 
@@ -113,7 +121,8 @@ def bound_table(verdicts: Sequence[Verdict]) -> Table:
         value = DASH if verdict.value is None else number(verdict.value)
         where = words_of(verdict.level) if verdict.level is not None else ""
         outcome = Text(verdict.outcome.value, COLORS[verdict.outcome])
-        table.add_row(bound.figure, _range_of(bound), value, where, outcome, bound.why)
+        expected = f"aim: {_range_of(bound)}" if bound.aim else _range_of(bound)
+        table.add_row(bound.figure, expected, value, where, outcome, bound.why)
     return table
 
 
@@ -225,6 +234,7 @@ def _verdict_values(verdict: Verdict) -> dict[str, Any]:
         "from_cells": bound.from_cells,
         "settings": bound.settings,
         "why": bound.why,
+        "aim": bound.aim,
         "outcome": verdict.outcome,
         "value": verdict.value,
         "level": None if level is None else {"cells": level.cells, "settings": level.settings},

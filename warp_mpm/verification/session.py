@@ -149,7 +149,8 @@ def judge(bound: Bound, results: Sequence[LevelResult], overall: dict[str, float
     if not met:
         return Verdict(bound, Outcome.NOT_MEASURED)
     value, level = min(met, key=lambda pair: bound.margin(pair[0]))
-    return Verdict(bound, Outcome.HELD if bound.holds_for(value) else Outcome.BROKEN, value, level)
+    failure = Outcome.MISSED if bound.aim else Outcome.BROKEN
+    return Verdict(bound, Outcome.HELD if bound.holds_for(value) else failure, value, level)
 
 
 def words_of(level: Level) -> str:
