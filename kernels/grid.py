@@ -9,9 +9,10 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
-from warp_mpm.kernels.filling import inside, solve_cell, stands_for_itself
-from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
+from warp_mpm.kernels.content import inside, solve_cell, stands_for_itself
+from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector2, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index, raise_maximum
+from warp_mpm.kernels.vectors import first_three, second_three
 from warp_mpm.kernels.walls import (
     Boundary,
     free_components,
@@ -38,20 +39,8 @@ def clear(grid: Grid, clock: wp.array(dtype=Clock), begin: int):
                 m = node_index(grid, index[0], index[1], index[2])
                 grid.node[m] = vector8()
                 grid.pressure[m] = ZERO
-                grid.cell_filling[m] = ZERO
+                grid.content[m] = vector2()
                 grid.reprojected[m] = vector4()
-
-
-@wp.func
-def first_three(node: vector8) -> vector3:
-    """Momentum or velocity of a node."""
-    return vector3(node[0], node[1], node[2])
-
-
-@wp.func
-def second_three(node: vector8) -> vector3:
-    """Force or acceleration of a node."""
-    return vector3(node[4], node[5], node[6])
 
 
 @wp.func
@@ -164,7 +153,7 @@ def mirror(
 @functools.cache
 def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
     """Sums of the scatter -> values: v = P / M, a = f / M + g; filling = V / V_i, and the field pressure,
-    sum w V p over the occupied volume. `cells` solves their filling.
+    sum w V p over the occupied volume. `cells` solves their content.
     `momentum` solves the first, `force` the second (all at once but for USF, whose forces come later). Tallies what
     walls add: `reactions` to forces [N], `impulses` to momenta [kg m/s], the latter for PIC and APIC, whose particles
     take the nodes' velocity over with a share of `pic_share`. The highest pressure of nodes at least half filled

@@ -22,7 +22,7 @@ def initial_strain_kernel(shape: Shape) -> wp.Kernel:
         p = begin + wp.tid()
         strain = gather_strain(grid, particles.cell[p], particles.fraction[p], particles.velocity[p], half_width, ZERO)
         rates = Maxima()
-        rates[STRAIN_RATE] = wp.abs(strain.divergence)
+        rates[STRAIN_RATE] = wp.abs(wp.trace(strain.gradient))
         raise_maxima(maxima, slab, rates)
 
     return measure_strain

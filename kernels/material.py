@@ -15,9 +15,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mpm.kernels.filling import gather_filling, inside
+from warp_mpm.kernels.content import FILLING, PRESSURE, gather_content, inside
 from warp_mpm.kernels.motion import Faces, place, settle
-from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3, vector4, vector8
+from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import (
     AMBIENT_WORK,
     CLAMPED_ENERGY,
@@ -28,12 +28,12 @@ from warp_mpm.kernels.records import (
     Particles,
     raise_maxima,
 )
+from warp_mpm.kernels.relaxation import relax_density
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.transfer import stencil_functions
-from warp_mpm.kernels.vectors import multiply_add4, multiply_add8
-from warp_mpm.kernels.viscosity import Viscosity, viscous_pressure, viscous_rate
+from warp_mpm.kernels.vectors import first_three, multiply_add4, multiply_add8, second_three
+from warp_mpm.kernels.viscosity import Viscosity, closing_rate, viscous_axis, viscous_pressure, viscous_rate
 
-RELAXATION = wp.constant(scalar(0.6))  # of the density towards full cells, per cell that sound crosses
 # Where a wave arrives, whether a particle burns already is a matter of round-off: what a switch would turn into a jump
 # sets in over a short part of the burn instead, so that mirror images stay mirror images.
 IGNITED = wp.constant(scalar(0.1))  # burn fraction from which on the viscosity acts fully
@@ -53,8 +53,9 @@ class StrainIncrement:
     """What the gather brings to the material update."""
 
     motion: vector3  # sum w (v^n + dt a), the velocity that moves the particle [m/s]
-    divergence: scalar  # div v [1/s]
-    work_divergence: scalar  # div of the velocity that does the work [1/s]
+    acceleration: vector3  # in direction [m/s]: what the step adds to the velocity
+    gradient: matrix3  # grad v [1/s], of the velocity that changes the volume
+    work_gradient: matrix3  # of the velocity that does the work [1/s]
     slip: vector3  # u = sum w (v_r - vF) [m/s]
     slip_squared: scalar  # sum w |v_r - vF|^2 [m2/s2]
     heat: scalar  # sum w H [J/kg]
@@ -82,8 +83,12 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
         sums = vector8()  # sum w (nodal values)
         nodal_sums = vector4()  # sum w (re-projected values)
         slip_squared = ZERO
-        divergence = ZERO  # of the velocity that changes the volume: re-projected, moving (damped), or v^n
-        second_divergence = ZERO  # of the velocity that does the work, or of the acceleration
+        node_x = vector8()  # derivatives by x, y, z of the nodal values
+        node_y = vector8()
+        node_z = vector8()
+        nodal_x = vector4()  # and of the re-projected ones
+        nodal_y = vector4()
+        nodal_z = vector4()
         for i in range(width):
             for j in range(width):
                 row = first + i * grid.stride_x + j * grid.stride_y
@@ -102,31 +107,38 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
                     if wp.static(reprojected):
                         nodal = grid.reprojected[row + k]
                         row_nodal = multiply_add4(row_nodal, wz[k], nodal)
-                        nodal_across = multiply_add4(nodal_across, sz[k], nodal)
                         if wp.static(damped):
-                            relative = vector3(nodal[0], nodal[1], nodal[2]) - velocity
+                            relative = first_three(nodal) - velocity
                             row_squared += wz[k] * wp.dot(relative, relative)
+                        else:
+                            nodal_across = multiply_add4(nodal_across, sz[k], nodal)
                 sums = multiply_add8(sums, wij, row_sums)
                 nodal_sums = multiply_add4(nodal_sums, wij, row_nodal)
                 slip_squared += wij * row_squared
+                node_x = multiply_add8(node_x, gx, row_sums)
+                node_y = multiply_add8(node_y, gy, row_sums)
+                node_z = multiply_add8(node_z, wij, row_across)
                 if wp.static(reprojected and not damped):
-                    divergence += gx * row_nodal[0] + gy * row_nodal[1] + wij * nodal_across[2]
-                else:
-                    divergence += gx * row_sums[0] + gy * row_sums[1] + wij * row_across[2]
-                if wp.static(reprojected or end):
-                    second_divergence += gx * row_sums[4] + gy * row_sums[5] + wij * row_across[6]
+                    nodal_x = multiply_add4(nodal_x, gx, row_nodal)
+                    nodal_y = multiply_add4(nodal_y, gy, row_nodal)
+                    nodal_z = multiply_add4(nodal_z, wij, nodal_across)
         result = StrainIncrement()
-        result.motion = vector3(sums[0], sums[1], sums[2])
-        if wp.static(not reprojected):
-            result.motion += dt * vector3(sums[4], sums[5], sums[6])
-        result.divergence = divergence
-        result.work_divergence = divergence
+        result.motion = first_three(sums)
+        result.gradient = wp.matrix_from_cols(first_three(node_x), first_three(node_y), first_three(node_z))
+        second = wp.matrix_from_cols(second_three(node_x), second_three(node_y), second_three(node_z))
+        result.work_gradient = result.gradient
         if wp.static(reprojected):
-            result.work_divergence = second_divergence
+            result.acceleration = first_three(sums) - second_three(sums)
+            result.work_gradient = second
+        else:
+            result.acceleration = dt * second_three(sums)
+            result.motion += result.acceleration
+        if wp.static(reprojected and not damped):
+            result.gradient = wp.matrix_from_cols(first_three(nodal_x), first_three(nodal_y), first_three(nodal_z))
         if wp.static(end):
-            result.divergence = divergence + dt * second_divergence
-            result.work_divergence = divergence + HALF * dt * second_divergence
-        result.slip = vector3(nodal_sums[0], nodal_sums[1], nodal_sums[2]) - velocity
+            result.gradient += dt * second
+            result.work_gradient += HALF * dt * second
+        result.slip = first_three(nodal_sums) - velocity
         result.slip_squared = slip_squared
         result.heat = nodal_sums[3]
         return result
@@ -140,7 +152,9 @@ class Response:
 
     burn_fraction: scalar
     pressure: scalar  # [Pa]
-    viscous_pressure: scalar  # [Pa]
+    closing_rate: scalar  # d of the viscosity [1/s]
+    viscous_pressure: scalar  # its isotropic part [Pa]
+    viscous_thrust: vector3  # its directed part is the pressure tensor s s^T [Pa]
     sound_speed: scalar  # of the products [m/s]
 
 
@@ -164,7 +178,8 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
         viscosity: Viscosity,
         density: scalar,
         energy: scalar,
-        divergence: scalar,
+        gradient: matrix3,
+        acceleration: vector3,
         burnt_before: scalar,
         since_arrival: scalar,
         since_booster: scalar,
@@ -178,7 +193,11 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
         result.pressure = burnt * products
         result.sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
         onset = wp.min(burnt / IGNITED, ONE)
-        result.viscous_pressure = onset * viscous_pressure(viscosity, density, result.sound_speed, divergence)
+        axis = viscous_axis(viscosity, result.sound_speed, acceleration, wp.trace(gradient))
+        result.closing_rate = closing_rate(axis, gradient)
+        q = onset * viscous_pressure(viscosity, density, result.sound_speed, result.closing_rate)
+        result.viscous_pressure = q * (ONE - wp.dot(axis, axis))
+        result.viscous_thrust = wp.sqrt(q) * axis
         return result
 
     return respond
@@ -192,7 +211,7 @@ def rates(
     sound_speed = response.sound_speed
     viscous = ZERO
     if response.burn_fraction > ZERO:
-        viscous = viscous_rate(viscosity, sound_speed, divergence)
+        viscous = viscous_rate(viscosity, sound_speed, response.closing_rate)
     return Maxima(
         sound_speed + wp.abs(velocity[0]),
         sound_speed + wp.abs(velocity[1]),
@@ -233,7 +252,16 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
         density = particles.density[p]
         energy = particles.energy[p]
         response = respond(
-            eos_parameters, burn_parameters, viscosity, density, energy, ZERO, ZERO, since_arrival, since_booster
+            eos_parameters,
+            burn_parameters,
+            viscosity,
+            density,
+            energy,
+            matrix3(),
+            vector3(),
+            ZERO,
+            since_arrival,
+            since_booster,
         )
         particles.pressure[p] = response.pressure
         burn_speed = ZERO
@@ -252,13 +280,6 @@ def damping_heat(strain: StrainIncrement, alpha: scalar) -> scalar:
     """Heat that the damping leaves in a particle [J/kg]: the nodes' share, and its own slip against them."""
     spread = wp.max(strain.slip_squared - alpha * wp.dot(strain.slip, strain.slip), ZERO)
     return strain.heat + HALF * alpha * spread
-
-
-@wp.func
-def relax_density(density: scalar, filling: scalar, crossing: scalar) -> scalar:
-    """Relax a volume to what the cells have room for: rho J^(a / (1 + a)), a = 0.6 dt c / h, not at free surfaces."""
-    rate = RELAXATION * crossing * inside(filling)
-    return density * wp.pow(wp.max(filling, HALF), rate / (ONE + rate))
 
 
 @functools.cache
@@ -300,8 +321,13 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         strained = gather_strain(grid, cell, fraction, velocity, half_width, dt)
 
         # Energy: the work of the very pressures of the force, and the heat of the damping.
-        expansion = dt * strained.work_divergence / particles.density[p]
-        energy = particles.energy[p] - (particles.pressure[p] + particles.viscous_pressure[p]) * expansion
+        divergence = wp.trace(strained.gradient)
+        work_divergence = wp.trace(strained.work_gradient)
+        expansion = dt * work_divergence / particles.density[p]
+        thrust = particles.viscous_thrust[p]
+        power = (particles.pressure[p] + particles.viscous_pressure[p]) * work_divergence
+        power += wp.dot(thrust, strained.work_gradient * thrust)
+        energy = particles.energy[p] - power * dt / particles.density[p]
         if ambient_pressure != ZERO:
             work = wp.float64(ambient_pressure) * wp.float64(expansion) * wp.float64(mass)
             wp.atomic_add(tallies, slab * TALLIES + AMBIENT_WORK, work)
@@ -313,17 +339,20 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
             wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
             energy = ZERO
 
-        # Density follows the strain, and in full cells relaxes to the room there is.
-        density = particles.density[p] / (ONE + dt * strained.divergence)
+        # Density follows the strain, and inside the material relaxes to room and pressure around it.
+        density = particles.density[p] / (ONE + dt * divergence)
         burnt = ONE
         if wp.static(burns):
             burnt = particles.burn_fraction[p]
         # An ambient pressure pushes on volumes, which the relaxation would then change without doing work.
         if wp.static(damped) and burnt > BURNT_OUT and ambient_pressure == ZERO:
-            sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
+            stiffness = density * sound_speed_squared(eos_parameters, density, energy)
             onset = (burnt - BURNT_OUT) / (ONE - BURNT_OUT)
-            filling = gather_filling(grid, cell, fraction)
-            density = relax_density(density, filling, onset * dt * sound_speed / viscosity.length)
+            around = gather_content(grid, cell, fraction)
+            if stiffness > ZERO:
+                excess = (particles.pressure[p] - around[PRESSURE]) / stiffness
+                crossing = onset * inside(around[FILLING]) * dt * wp.sqrt(stiffness / density) / viscosity.length
+                density = relax_density(density, around[FILLING], excess, crossing)
 
         moved = ZERO
         if wp.static(move):
@@ -345,7 +374,8 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
             viscosity,
             density,
             energy,
-            strained.divergence,
+            strained.gradient,
+            strained.acceleration,
             burnt,
             since_arrival,
             since_booster,
@@ -354,11 +384,12 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         particles.energy[p] = energy
         particles.pressure[p] = response.pressure
         particles.viscous_pressure[p] = response.viscous_pressure
+        particles.viscous_thrust[p] = response.viscous_thrust
         burn_speed = ZERO
         if wp.static(burns):
             particles.burn_fraction[p] = response.burn_fraction
             if response.burn_fraction < ONE:
                 burn_speed = burn_parameters.detonation_speed
-        raise_maxima(maxima, slab, rates(response, viscosity, velocity, strained.divergence, burn_speed, moved))
+        raise_maxima(maxima, slab, rates(response, viscosity, velocity, divergence, burn_speed, moved))
 
     return update

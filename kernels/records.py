@@ -6,7 +6,7 @@ Nodes carry one layer of ghosts on every face, because a stencil of three nodes 
 
 import warp as wp
 
-from warp_mpm.kernels.precision import scalar, vector3, vector4, vector8
+from warp_mpm.kernels.precision import scalar, vector2, vector3, vector4, vector8
 
 
 @wp.struct
@@ -28,7 +28,8 @@ class Particles:
     density: wp.array(dtype=scalar)  # [kg/m3]
     energy: wp.array(dtype=scalar)  # specific internal energy, chemical energy included [J/kg]
     pressure: wp.array(dtype=scalar)  # [Pa]
-    viscous_pressure: wp.array(dtype=scalar)  # [Pa]
+    viscous_pressure: wp.array(dtype=scalar)  # isotropic part of the artificial viscosity's pressure [Pa]
+    viscous_thrust: wp.array(dtype=vector3)  # s: its directed part is the pressure tensor s s^T [Pa]
     burn_fraction: wp.array(dtype=scalar)
     arrival_time: wp.array(dtype=scalar)  # [s]
     booster_time: wp.array(dtype=scalar)  # from which it burns at once [s]
@@ -42,7 +43,7 @@ class Grid:
     node: wp.array(dtype=vector8)  # momentum, mass, force, volume -> velocity, mass, acceleration, filling; and for
     # the material update of MUSL: velocity that moves the particles, mass, velocity that does the work, filling
     pressure: wp.array(dtype=scalar)  # sum of w V p [J] -> field pressure [Pa]
-    cell_filling: wp.array(dtype=scalar)  # of cells: sum of L V [m3] -> filling (see `filling.py`)
+    content: wp.array(dtype=vector2)  # of cells: L V p [J] and L V [m3] -> pressure [Pa], filling (see `content.py`)
     reprojected: wp.array(dtype=vector4)  # momentum, kinetic energy -> velocity, heat of the damping [J/kg]
     kick: wp.array(dtype=vector8)  # sharpened acceleration in the lanes of `node`; then what `node` holds for the
     # material update, not yet sharpened (see `sharpen.py`)

@@ -21,7 +21,7 @@ from warp_mpm.kernels.walls import Boundary, is_owner
 
 GROWTH = wp.constant(scalar(1.1))  # of the time step, from one step to the next, at most
 LARGEST_STRAIN = wp.constant(scalar(0.2))  # |div v| dt, at most
-DAMPING = 0.3  # k of the conservative damping
+DAMPING = 0.25  # k of the conservative damping
 TINY = wp.constant(scalar(1.0e-30))  # keeps a rate that is zero from being divided by
 
 # Lanes of the audit, one row for each slab.

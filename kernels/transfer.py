@@ -9,7 +9,7 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.blocks import stamp_blocks
-from warp_mpm.kernels.filling import lowest_cell, scatter_filling
+from warp_mpm.kernels.content import lowest_cell, scatter_content
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
@@ -93,11 +93,12 @@ def node_offset_function(shape: Shape) -> wp.Function:
 
 
 @functools.cache
-def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, filling: bool) -> wp.Kernel:
+def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, content: bool) -> wp.Kernel:
     """Particles -> nodes: momentum, mass and volume (`momentum`); internal force and field pressure (`force`).
 
-    sum w m, sum w m v (APIC: v + C (x_i - x_p)), sum w V; f = sum (p + q - p_ambient) V grad w, sum w V p; and to the
-    cells sum L V (`filling`).
+    sum w m, sum w m v (APIC: v + C (x_i - x_p)), sum w V; f = sum V (p + q - p_ambient + s s^T) grad w, q and s s^T
+    the isotropic and the directed part of the artificial viscosity, sum w V p; and to the
+    cells sum L V p, sum L V (`content`).
     """
     width = shape.width
     first_node, weights, slopes, _ = stencil_functions(shape)
@@ -126,9 +127,10 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, fill
         carried = mass * particles.velocity[p]
         pressure_volume = particles.pressure[p] * volume
         pull = pressure_volume + (particles.viscous_pressure[p] - ambient_pressure) * volume
-        sx = slopes(fraction[0], half_width) * (pull / grid.spacing[0])
-        sy = slopes(fraction[1], half_width) * (pull / grid.spacing[1])
-        sz = slopes(fraction[2], half_width) * (pull / grid.spacing[2])
+        thrust = wp.sqrt(volume) * particles.viscous_thrust[p]
+        sx = slopes(fraction[0], half_width) / grid.spacing[0]
+        sy = slopes(fraction[1], half_width) / grid.spacing[1]
+        sz = slopes(fraction[2], half_width) / grid.spacing[2]
         for i in range(width):
             for j in range(width):
                 row = first + i * grid.stride_x + j * grid.stride_y
@@ -138,8 +140,12 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, fill
                 if wp.static(momentum):
                     along += wij * vector8(carried[0], carried[1], carried[2], mass, ZERO, ZERO, ZERO, volume)
                 if wp.static(force):
-                    along += vector8(ZERO, ZERO, ZERO, ZERO, sx[i] * wy[j], wx[i] * sy[j], ZERO, ZERO)
-                    across = vector8(ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, wij, ZERO)
+                    gx = sx[i] * wy[j]
+                    gy = wx[i] * sy[j]
+                    f = vector3(pull * gx, pull * gy, ZERO) + (thrust[0] * gx + thrust[1] * gy) * thrust
+                    along += vector8(ZERO, ZERO, ZERO, ZERO, f[0], f[1], f[2], ZERO)
+                    f = vector3(ZERO, ZERO, pull * wij) + (thrust[2] * wij) * thrust
+                    across = vector8(ZERO, ZERO, ZERO, ZERO, f[0], f[1], f[2], ZERO)
                 for k in range(width):
                     value = multiply_add8(vector8(), wz[k], along)
                     if wp.static(affine and momentum):
@@ -149,8 +155,8 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, fill
                         value = multiply_add8(value, sz[k], across)
                         wp.atomic_add(grid.pressure, row + k, wij * wz[k] * pressure_volume)
                     scatter_add8(grid.node, row + k, ONE, value)
-        if wp.static(filling):
-            scatter_filling(grid, particles.cell[p], fraction, volume)
+        if wp.static(content):
+            scatter_content(grid, particles.cell[p], fraction, particles.pressure[p], volume)
 
     return scatter
 

@@ -1,12 +1,14 @@
-"""Multiply-add on node values, written so that a CPU does it in its vector units.
+"""Node values: their lanes, and multiply-add written so that a CPU does it in its vector units.
 
 Warp's own vectors compile to scalar code on a CPU. Each operation here is one line of arithmetic; on a CPU it goes
 through clang's vector types, on a GPU it is the plain Warp expression (tested to give the same values).
 """
 
+from typing import Any
+
 import warp as wp
 
-from warp_mpm.kernels.precision import scalar, vector4, vector8
+from warp_mpm.kernels.precision import scalar, vector3, vector4, vector8
 
 _CTYPE = "float" if scalar is wp.float32 else "double"
 
@@ -41,6 +43,18 @@ def _scatter_add(lanes: int) -> str:
     wp::atomic_add(nodes, index, wp::mul(value, weight));
 #endif
 """
+
+
+@wp.func
+def first_three(values: Any) -> vector3:
+    """The first vector in the lanes of a node."""
+    return vector3(values[0], values[1], values[2])
+
+
+@wp.func
+def second_three(values: vector8) -> vector3:
+    """The second vector in the lanes of a node."""
+    return vector3(values[4], values[5], values[6])
 
 
 @wp.func_native(_multiply_add(4))

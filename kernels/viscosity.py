@@ -1,8 +1,22 @@
-"""Artificial viscosity (von Neumann and Richtmyer 1950, with Landshoff's linear term; as in LS-DYNA and MPM3D)."""
+"""Artificial viscosity (von Neumann and Richtmyer 1950, with Landshoff's linear term), directed where it matters.
+
+A shock compresses along its normal; gas that converges smoothly is compressed across its motion too, and must not be
+heated for that. M. L. Wilkins (J. Comput. Phys. 36, 281, 1980) therefore takes the strain rate along the acceleration,
+which is the shock's normal. Here the viscosity is a pressure tensor
+
+    Q (b b^T + (1 - |b|^2) I),    d = b . (grad v) . b + (1 - |b|^2) div v,    Q = rho l (c_Q l d^2 - c_L c d) if d < 0,
+
+with b along the acceleration: nearly a unit vector where the compression is strong, |b|^2 = x^2 / (x^2 + x0^2) with
+x = (l div v)^2 and x0 = (0.2 c)^2, and small where it is weak, so that noise has no say in the direction. Along one
+axis it is the scalar viscosity, whatever |b| is.
+"""
 
 import warp as wp
 
-from warp_mpm.kernels.precision import ZERO, scalar
+from warp_mpm.kernels.precision import ONE, ZERO, matrix3, scalar, vector3
+
+DIRECTED = wp.constant(scalar(0.2))  # of the sound speed: velocity jump over a cell from which on it is directed
+TINY = wp.constant(scalar(1.0e-30))  # keeps rest from being divided by
 
 
 @wp.struct
@@ -15,16 +29,37 @@ class Viscosity:
 
 
 @wp.func
-def viscous_pressure(viscosity: Viscosity, density: scalar, sound_speed: scalar, divergence: scalar) -> scalar:
-    """Q = rho l (c_Q l d^2 - c_L c d) [Pa] in compression (d = div v < 0), else 0."""
-    compression = wp.min(divergence, ZERO)
+def viscous_axis(viscosity: Viscosity, sound_speed: scalar, acceleration: vector3, divergence: scalar) -> vector3:
+    """B: along the acceleration, which may be in any unit, and as long as the compression is strong."""
+    axis = vector3()
+    closing = viscosity.length * divergence
+    threshold = DIRECTED * sound_speed
+    closing = closing * closing
+    threshold = threshold * threshold
+    squared = closing * closing + threshold * threshold
+    size = wp.dot(acceleration, acceleration)
+    if squared > TINY and size > TINY:
+        axis = (closing / (wp.sqrt(squared) * wp.sqrt(size))) * acceleration
+    return axis
+
+
+@wp.func
+def closing_rate(axis: vector3, gradient: matrix3) -> scalar:
+    """d = b . (grad v) . b + (1 - |b|^2) div v [1/s]."""
+    return wp.dot(axis, gradient * axis) + (ONE - wp.dot(axis, axis)) * wp.trace(gradient)
+
+
+@wp.func
+def viscous_pressure(viscosity: Viscosity, density: scalar, sound_speed: scalar, rate: scalar) -> scalar:
+    """Q = rho l (c_Q l d^2 - c_L c d) [Pa] for a closing rate d < 0, else 0."""
+    compression = wp.min(rate, ZERO)
     quadratic = viscosity.quadratic * viscosity.length * compression * compression
     return density * viscosity.length * (quadratic - viscosity.linear * sound_speed * compression)
 
 
 @wp.func
-def viscous_rate(viscosity: Viscosity, sound_speed: scalar, divergence: scalar) -> scalar:
+def viscous_rate(viscosity: Viscosity, sound_speed: scalar, rate: scalar) -> scalar:
     """Viscosity over length squared, nu / l^2 [1/s]: one explicit step may not exceed a Courant number over this."""
-    compression = wp.max(-divergence, ZERO)
+    compression = wp.max(-rate, ZERO)
     active = wp.where(compression > ZERO, viscosity.linear * sound_speed / viscosity.length, ZERO)
     return viscosity.quadratic * compression + active

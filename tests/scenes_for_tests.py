@@ -129,17 +129,18 @@ def nodes(solver: Solver) -> np.ndarray:
     return solver.state.grid.node.numpy().copy().reshape(*shape, 8)
 
 
-def cell_filling(solver: Solver) -> np.ndarray:
-    """Copy of the filling of all cells (nx + 3, ny + 3, nz + 3), ghosts included, in double; after a scatter, volumes.
+def cell_content(solver: Solver) -> np.ndarray:
+    """Copy of what all cells hold (nx + 3, ny + 3, nz + 3, 2), ghosts included, in double: pressure [Pa] and filling.
 
-    Cell (i, j, k) of the domain is at [i + 1, j + 1, k + 1]; the last layer along every axis is no cell.
+    Unsolved, after a scatter alone, sum L V p [J] and sum L V [m3]. Cell (i, j, k) of the domain is at
+    [i + 1, j + 1, k + 1]; the last layer along every axis is no cell.
     """
     shape = tuple(n + 3 for n in solver.model.scene.domain.cells)
-    return solver.state.grid.cell_filling.numpy().reshape(shape).astype(np.float64)
+    return solver.state.grid.content.numpy().reshape(*shape, 2).astype(np.float64)
 
 
 def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
-    """Scatter all particles onto an empty grid, without solving it; the cells' volumes too if the solver does.
+    """Scatter all particles onto an empty grid, without solving it; into the cells too if the solver does.
 
     Returns:
         Node sums (nx + 3, ny + 3, nz + 3, 8), momentum, mass, force, volume, and sum w V p (nx + 3, ...), in double.
@@ -147,7 +148,7 @@ def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
     state, model = solver.state, solver.model
     state.grid.node.zero_()
     state.grid.pressure.zero_()
-    state.grid.cell_filling.zero_()
+    state.grid.content.zero_()
     kernel = transfer.scatter_kernel(model.shape, True, True, model.affine, model.damped)
     inputs = [state.particles, state.grid, state.clock, model.charges[0].half_width, model.scene.ambient_pressure, 0]
     wp.launch(kernel, state.count, inputs=inputs, device=state.device)
@@ -156,23 +157,24 @@ def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
 
 
 def tent_sums(domain: Domain, position: np.ndarray, carried: np.ndarray) -> np.ndarray:
-    """What particles at positions (n, 3) carry (n,), shared out among the cells by tents at their centres, in double.
+    """What particles at positions (n, 3) carry (n, ...), shared out among the cells by tents at their centres.
 
     Returns:
-        Sums (nx + 3, ny + 3, nz + 3), laid out as `cell_filling`; what fell behind faces is still in the ghosts.
+        Sums (nx + 3, ny + 3, nz + 3, ...) in double, laid out as `cell_content`; what fell behind faces is still in the
+        ghosts.
     """
     place = (position - domain.lower) / domain.spacing
-    sums = np.zeros(tuple(n + 3 for n in domain.cells))
+    sums = np.zeros((*(n + 3 for n in domain.cells), *carried.shape[1:]))
     nearest = np.floor(place).astype(int)
     for shift in itertools.product((-1, 0, 1), repeat=3):  # the cell a particle is in, and all its neighbours
         cell = nearest + shift
         weights = np.maximum(1.0 - np.abs(place - (cell + 0.5)), 0.0).prod(axis=1)
-        np.add.at(sums, tuple((cell + 1).T), weights * carried)
+        np.add.at(sums, tuple((cell + 1).T), (weights * carried.T).T)
     return sums
 
 
 def mirrored_cells(sums: np.ndarray, walls: Walls) -> np.ndarray:
-    """Cell sums with the ghosts behind walls added to the cells that they mirror, and then set equal to them."""
+    """Cell sums (nx + 3, ny + 3, nz + 3, ...), ghosts behind walls added to what they mirror, then equal to it."""
     faces = walls.faces()
     for axis in range(3):
         sums = np.moveaxis(sums, axis, 0).copy()

@@ -15,7 +15,6 @@ from warp_mpm.detonators import PointDetonator
 from warp_mpm.errors import InputError
 from warp_mpm.exact.chapman_jouguet import chapman_jouguet_state, energy_for_speed, hugoniot_pressure
 from warp_mpm.kernels import eos as eos_package
-from warp_mpm.kernels import material
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.kernels.precision import scalar
@@ -221,31 +220,6 @@ def test_unburnt_matter_has_no_viscosity(device):
     assert values["viscous_pressure"][~unburnt].max() > 0.01 * explosive().cj.pressure
     without = advance(start(block((20, 2, 2)), device, viscosity=(0.0, 0.0)), 20)
     assert not particle_values(without.state)["viscous_pressure"].any()
-
-
-@functools.cache
-def relaxation_kernel():
-    """Kernel of the density relaxation."""
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def evaluate(given: wp.array2d(dtype=scalar), densities: wp.array(dtype=scalar)):
-        n = wp.tid()
-        densities[n] = material.relax_density(given[n, 0], given[n, 1], given[n, 2])
-
-    return evaluate
-
-
-def test_density_relaxation(device):
-    """Rho J^(a / (1 + a)), a = 0.6 dt c / h, faded out for J from 0.95 to 0.80 (`kernels/material.py`)."""
-    rows = [(1000.0, filling, 0.3) for filling in (1.2, 1.0, 0.95, 0.875, 0.80, 0.5, 0.0)]
-    expected = []
-    for density, filling, crossing in rows:
-        a = 0.6 * crossing * min(max((filling - 0.80) / 0.15, 0.0), 1.0)
-        expected.append(density * max(filling, 0.5) ** (a / (1.0 + a)))
-    densities = wp.zeros(len(rows), dtype=scalar, device=device)
-    given = wp.array(np.array(rows, dtype=np.float32), dtype=scalar, device=device)
-    wp.launch(relaxation_kernel(), len(rows), inputs=[given, densities], device=device)
-    np.testing.assert_allclose(densities.numpy(), expected, rtol=16 * ROUND_OFF)
 
 
 # ---- Chapman-Jouguet state and the check of explosives ---------------------------------------------------------------

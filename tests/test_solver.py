@@ -12,7 +12,7 @@ from scenes_for_tests import (
     advance,
     audited,
     block,
-    cell_filling,
+    cell_content,
     explosive,
     inert_gas,
     nodes,
@@ -71,7 +71,7 @@ def run_on(threads, **config):
     bits = particle_values(state)
     bits["memory order"] = state.particles.index.numpy().copy()
     bits["field pressure"] = state.field_pressure().copy()
-    bits["cells' filling"] = cell_filling(solver)
+    bits["cells' content"] = cell_content(solver)
     bits["clock"] = np.array(list(state.clock_values()))
     bits["impulse"] = totals.wall_impulse
     bits["sums"] = np.array([totals.kinetic, totals.internal, totals.grid_mass, totals.energy_out, *totals.momentum])
@@ -174,7 +174,7 @@ def test_the_grid_works_only_where_particles_are(shape, device):
         held = np.unique(lowest // 4, axis=0)
         stamps = state.grid.stamps.numpy().reshape(tuple(state.grid.blocks))
         active = np.argwhere(stamps == int(state.clock_values()["step"]))
-        values = np.abs(nodes(solver)).sum(axis=-1) + cell_filling(solver)
+        values = np.abs(nodes(solver)).sum(axis=-1) + np.abs(cell_content(solver)).sum(axis=-1)
         used = np.unique(np.argwhere(values > 0.0) // 4, axis=0)
         for blocks in (active, used):
             steps = blocks[:, None] - held

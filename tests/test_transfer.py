@@ -18,7 +18,7 @@ from scenes_for_tests import (
     OPEN,
     ROUND_OFF,
     block,
-    cell_filling,
+    cell_content,
     inert_gas,
     nodes,
     particle_values,
@@ -28,6 +28,7 @@ from scenes_for_tests import (
 
 from warp_mpm.config import Order, ShapeFunction, Transfer
 from warp_mpm.kernels import material, transfer
+from warp_mpm.kernels.content import FILLING, PRESSURE
 from warp_mpm.kernels.motion import move_kernel
 from warp_mpm.kernels.precision import scalar
 from warp_mpm.kernels.records import Clock
@@ -114,7 +115,7 @@ def assert_sums_agree(actual, expected, terms):
 def test_scatter_conserves_mass_momentum_and_volume(shape, affine, device):
     """Sum over nodes of sum w m, w m v, w V = sum over particles: partition of unity; the affine part adds nothing.
 
-    So is the sum over cells of sum L V, which only the damping's relaxation needs.
+    So are the sums over cells of sum L V and sum L V p, which only the damping's relaxation needs.
     """
     solver = cloud(shape, device, transfer=Transfer.APIC if affine else Transfer.FLIP)
     if affine:
@@ -130,10 +131,14 @@ def test_scatter_conserves_mass_momentum_and_volume(shape, affine, device):
     assert_sums_agree(sums[:, 0:3].sum(axis=0), momentum.sum(axis=0), carried)
     volume = (mass / values["density"]).sum()
     assert_sums_agree(sums[:, 7].sum(), volume, sums[:, 7])
-    assert not cell_filling(solver).any()
+    assert not cell_content(solver).any()
     damped = cloud(shape, device)
     scatter(damped)
-    assert_sums_agree(cell_filling(damped).sum(), volume, cell_filling(damped).ravel())
+    held = cell_content(damped).reshape(-1, 2)
+    assert_sums_agree(held[:, FILLING].sum(), volume, held[:, FILLING])
+    work = (mass / values["density"] * values["pressure"]).sum()
+    assert work > 0.0
+    assert_sums_agree(held[:, PRESSURE].sum(), work, held[:, PRESSURE])
 
 
 @shapes
@@ -216,8 +221,8 @@ def strain_kernel(shape, strain, damped):
         for axis in range(3):
             rows[p, axis] = s.motion[axis]
             rows[p, 3 + axis] = s.slip[axis]
-        rows[p, 6] = s.divergence
-        rows[p, 7] = s.work_divergence
+        rows[p, 6] = wp.trace(s.gradient)
+        rows[p, 7] = wp.trace(s.work_gradient)
         rows[p, 8] = s.slip_squared
         rows[p, 9] = s.heat
 

@@ -5,7 +5,7 @@ import warp as wp
 
 from warp_mpm.kernels import arrival, grid, order
 from warp_mpm.kernels.blocks import EDGE, NODES
-from warp_mpm.kernels.precision import NEVER, matrix3, scalar, vector3, vector4, vector8
+from warp_mpm.kernels.precision import NEVER, matrix3, scalar, vector2, vector3, vector4, vector8
 from warp_mpm.kernels.records import TALLIES, Clock, Grid, Maxima, Particles
 from warp_mpm.kernels.walls import REACTIONS
 from warp_mpm.model import Model
@@ -25,6 +25,7 @@ PARTICLE_ARRAYS = (
     "energy",
     "pressure",
     "viscous_pressure",
+    "viscous_thrust",
     "burn_fraction",
     "arrival_time",
     "booster_time",
@@ -158,8 +159,8 @@ class State:
 
 def memory_needed(model: Model) -> int:
     """Bytes that a state of this model takes on its device."""
-    particle = 6 + 2 * 12 + 9 * 4 + 12 + 24 + (36 if model.affine else 0)
-    node = 8 * 4 + 4 + 4 + 4 * 4 + (8 * 4 if model.damped else 0)
+    particle = 6 + 3 * 12 + 9 * 4 + 12 + 24 + (36 if model.affine else 0)
+    node = 8 * 4 + 4 + 2 * 4 + 4 * 4 + (8 * 4 if model.damped else 0)
     nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
     return int(model.scene.particle_count * particle + nodes * node)
 
@@ -171,7 +172,7 @@ def _allocate_grid(model: Model) -> Grid:
     grid = Grid()
     grid.node = wp.zeros(total, dtype=vector8, device=model.device)
     grid.pressure = wp.zeros(total, dtype=scalar, device=model.device)
-    grid.cell_filling = wp.zeros(total, dtype=scalar, device=model.device)
+    grid.content = wp.zeros(total, dtype=vector2, device=model.device)
     grid.reprojected = wp.zeros(total, dtype=vector4, device=model.device)
     grid.kick = wp.zeros(total if model.damped else 0, dtype=vector8, device=model.device)
     blocks = [-(-n // EDGE) for n in counts]
@@ -211,6 +212,7 @@ def _place_particles(model: Model) -> Particles:
     particles.energy = per_charge([c.material.specific_energy for c in scene.charges])
     particles.pressure = wp.zeros(n, dtype=scalar, device=device)
     particles.viscous_pressure = wp.zeros(n, dtype=scalar, device=device)
+    particles.viscous_thrust = wp.zeros(n, dtype=vector3, device=device)
     particles.burn_fraction = wp.zeros(burning, dtype=scalar, device=device)
     particles.arrival_time = wp.full(burning, NEVER, dtype=scalar, device=device)
     particles.booster_time = wp.full(burning, NEVER, dtype=scalar, device=device)

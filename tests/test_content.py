@@ -1,9 +1,9 @@
-"""How full the cells are: J_c = sum L(x_p - x_c) V / V_c, L the tent function at a cell's centre.
+"""What the cells hold: P_c = sum L(x_p - x_c) V p / V_c and J_c = sum L V / V_c, L the tent at a cell's centre.
 
 Checked against the formula in NumPy for every kind of face, and against what it is made for: the internal force of the
-quadratic B-spline is the difference of sum L V p / h between cells. That follows from the spline being a box convolved
-with a tent (de Boor, A Practical Guide to Splines, 1978): its slope is the difference of two tents, half a cell to
-either side.
+quadratic B-spline is the difference of P_c between cells, times their cross-section. That follows from the spline being
+a box convolved with a tent (de Boor, A Practical Guide to Splines, 1978): its slope is the difference of two tents,
+half a cell to either side.
 """
 
 import functools
@@ -18,7 +18,7 @@ from scenes_for_tests import (
     STICK,
     advance,
     block,
-    cell_filling,
+    cell_content,
     inert_gas,
     mirrored_cells,
     nodes,
@@ -30,8 +30,9 @@ from scenes_for_tests import (
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.config import ShapeFunction
 from warp_mpm.geometry import Box
-from warp_mpm.kernels import filling
-from warp_mpm.kernels.precision import scalar
+from warp_mpm.kernels import content
+from warp_mpm.kernels.content import FILLING, PRESSURE
+from warp_mpm.kernels.precision import scalar, vector2
 from warp_mpm.kernels.records import Grid, Particles
 from warp_mpm.kernels.shape import offset_nearest_node
 from warp_mpm.scene import Wall, Walls
@@ -82,19 +83,25 @@ def stir(state):
     particles.energy.assign(random.uniform(1e5, 2e6, n).astype(np.float32))
 
 
-def volumes(values):
-    """Volumes V of particles (n,) [m3], in double."""
-    return values["mass"].astype(np.float64) / values["density"]
+def carried(values):
+    """What particles bring to the cells (n, 2), in double: V p [J] and V [m3], in the lanes of a cell's content."""
+    volume = values["mass"].astype(np.float64) / values["density"]
+    result = np.empty((len(volume), 2))
+    result[:, PRESSURE] = volume * values["pressure"]
+    result[:, FILLING] = volume
+    return result
 
 
-def assert_filling_is_its_formula(solver):
+def assert_content_is_its_formula(solver):
     """In every cell and ghost, to the round-off of the sums; the last layer, which is no cell, stays empty."""
     scene, values = solver.model.scene, particle_values(solver.state)
-    sums = tent_sums(scene.domain, values["position"], volumes(values))
+    sums = tent_sums(scene.domain, values["position"], carried(values))
     expected = mirrored_cells(sums, scene.walls) / scene.domain.cell_volume
-    computed = cell_filling(solver)
-    assert expected.max() > 0.0
-    np.testing.assert_allclose(computed, expected, rtol=0, atol=SUMMED * expected.max())
+    computed = cell_content(solver)
+    for lane in (PRESSURE, FILLING):
+        largest = expected[..., lane].max()
+        assert largest > 0.0
+        np.testing.assert_allclose(computed[..., lane], expected[..., lane], rtol=0, atol=SUMMED * largest)
     for layer in (computed[-1], computed[:, -1], computed[:, :, -1]):
         assert not layer.any()
 
@@ -105,7 +112,7 @@ def assert_filling_is_its_formula(solver):
 @wp.kernel(enable_backward=False)
 def tents_kernel(fractions: wp.array(dtype=scalar), rows: wp.array2d(dtype=scalar)):
     n = wp.tid()
-    weights = filling.tents(fractions[n])
+    weights = content.tents(fractions[n])
     rows[n, 0] = scalar(offset_nearest_node(fractions[n]))
     rows[n, 1] = weights[0]
     rows[n, 2] = weights[1]
@@ -127,83 +134,85 @@ def test_tents(device):
 
 @functools.cache
 def gather_kernel():
-    """Kernel that gathers the filling at all particles."""
+    """Kernel that gathers the content of the cells around all particles."""
 
     @wp.kernel(enable_backward=False, module="unique")
-    def evaluate(particles: Particles, grid: Grid, fillings: wp.array(dtype=scalar)):
+    def evaluate(particles: Particles, grid: Grid, contents: wp.array(dtype=vector2)):
         p = wp.tid()
-        fillings[p] = filling.gather_filling(grid, particles.cell[p], particles.fraction[p])
+        contents[p] = content.gather_content(grid, particles.cell[p], particles.fraction[p])
 
     return evaluate
 
 
-def test_gathered_filling_reproduces_linear_fields(device):
-    """Cells and ghosts filled to 0.7 + g . x give particles 0.7 + g . x_p; what is no cell is not read."""
+def test_gathered_content_reproduces_linear_fields(device):
+    """Cells and ghosts that hold s (0.7 + g . x) give particles s (0.7 + g . x_p); what is no cell is not read."""
     cells = (5, 4, 3)
     state = start(box(cells, OPEN), device, prepare=stir).state
-    slope = np.array([3.0, -4.0, 5.0])
+    slopes = np.array([[3.0, -4.0], [-4.0, 5.0], [5.0, 2.0]])  # of the two lanes
+    scales = np.array([1e9, 1.0])
     centres = [LOWER[axis] + SPACING[axis] * (np.arange(n + 3) - 0.5) for axis, n in enumerate(cells)]
-    given = 0.7 + np.stack(np.meshgrid(*centres, indexing="ij"), axis=-1) @ slope
+    given = scales * (0.7 + np.stack(np.meshgrid(*centres, indexing="ij"), axis=-1) @ slopes)
     given[-1] = given[:, -1] = given[:, :, -1] = np.nan
-    state.grid.cell_filling.assign(given.ravel().astype(np.float32))
-    gathered = wp.zeros(state.count, dtype=scalar, device=device)
+    state.grid.content.assign(given.reshape(-1, 2).astype(np.float32))
+    gathered = wp.zeros(state.count, dtype=vector2, device=device)
     wp.launch(gather_kernel(), state.count, inputs=[state.particles, state.grid, gathered], device=device)
-    expected = 0.7 + particle_values(state)["position"] @ slope
-    # Weights and fillings, all below 1, are rounded a few times each.
-    np.testing.assert_allclose(state.in_creation_order(gathered.numpy()), expected, rtol=0, atol=16 * ROUND_OFF)
+    expected = 0.7 + particle_values(state)["position"] @ slopes
+    # Weights and contents, all below 1 in units of the scales, are rounded a few times each.
+    computed = state.in_creation_order(gathered.numpy()) / scales
+    np.testing.assert_allclose(computed, expected, rtol=0, atol=16 * ROUND_OFF)
 
 
 def test_inside():
     """1 from a filling of 0.95 on, 0 up to 0.80, linear between."""
     for full, expected in ((2.0, 1.0), (0.95, 1.0), (0.9125, 0.75), (0.83, 0.2), (0.80, 0.0), (0.0, 0.0)):
         # The difference of two fillings is rounded to 1e-7 of 0.15.
-        assert float(filling.inside(full)) == pytest.approx(expected, abs=1e-6)
+        assert float(content.inside(full)) == pytest.approx(expected, abs=1e-6)
 
 
-# ---- filling ---------------------------------------------------------------------------------------------------------
+# ---- content ---------------------------------------------------------------------------------------------------------
 
 
 @walls_and_cells
-def test_filling_is_its_formula(walls, cells, device):
+def test_content_is_its_formula(walls, cells, device):
     """Walls fold and mirror, axis by axis; beyond open faces cells are cells."""
-    assert_filling_is_its_formula(start(box(cells, walls), device, prepare=stir))
+    assert_content_is_its_formula(start(box(cells, walls), device, prepare=stir))
 
 
 @walls_and_cells
 def test_ghosts_behind_walls_are_mirror_images(walls, cells, device):
-    """Bit for bit, behind edges and corners too; beyond open faces cells have their own values."""
-    values = cell_filling(start(box(cells, walls), device, prepare=stir))
+    """Bit for bit in both lanes, behind edges and corners too; beyond open faces cells have their own values."""
+    values = cell_content(start(box(cells, walls), device, prepare=stir))
     for axis, side in itertools.product(range(3), range(2)):
         along = np.moveaxis(values, axis, 0)
         ghost, cell = ((along[0], along[1]), (along[-2], along[-3]))[side]
         if walls.faces()[2 * axis + side] is Wall.OPEN:
-            assert np.any(ghost != cell)
+            assert np.any(ghost != cell, axis=(0, 1)).all()
         else:
             np.testing.assert_array_equal(ghost, cell)
 
 
 @walls_and_cells
-def test_the_cells_hold_the_particles_volume(walls, cells, device):
-    """Sum J_c V_c = sum V: over the cells of the domain in a closed box, else those beyond open faces included."""
+def test_the_cells_hold_what_the_particles_bring(walls, cells, device):
+    """Sum P_c V_c = sum V p and sum J_c V_c = sum V: over the domain's cells in a closed box, else those beyond too."""
     scene = box(cells, walls)
     solver = start(scene, device, prepare=stir)
-    held = cell_filling(solver)
+    held = cell_content(solver)
     for axis, (low, high) in enumerate(zip(walls.faces()[0::2], walls.faces()[1::2], strict=True)):
         first, last = int(low is not Wall.OPEN), cells[axis] + 1 + int(high is Wall.OPEN)
         held = np.moveaxis(np.moveaxis(held, axis, 0)[first:last], 0, axis)
-    assert (held.shape == cells) == (Wall.OPEN not in walls.faces())
-    total = volumes(particle_values(solver.state)).sum()
-    assert held.sum() * scene.domain.cell_volume == pytest.approx(total, rel=SUMMED)
+    assert (held.shape == (*cells, 2)) == (Wall.OPEN not in walls.faces())
+    total = carried(particle_values(solver.state)).sum(axis=0)
+    np.testing.assert_allclose(held.sum(axis=(0, 1, 2)) * scene.domain.cell_volume, total, rtol=SUMMED)
 
 
 @pytest.mark.parametrize("shape", list(ShapeFunction), ids=lambda shape: shape.value)
 @pytest.mark.parametrize("free", [False, True], ids=["closed", "free"])
-def test_filling_after_some_steps(shape, free, device):
+def test_content_after_some_steps(shape, free, device):
     """For every shape function nothing of earlier steps is left, while gas expands through the cells."""
     scene = block((5, 4, 3), walls=OPEN, margin_cells=2) if free else block((5, 4, 3))
     solver = advance(start(scene, device, shape=shape), 12)
-    assert_filling_is_its_formula(solver)
-    inside = cell_filling(solver)[1:-2, 1:-2, 1:-2]
+    assert_content_is_its_formula(solver)
+    inside = cell_content(solver)[1:-2, 1:-2, 1:-2, FILLING]
     assert (inside.min() < 0.5) == free
 
 
@@ -213,10 +222,10 @@ def test_filling_after_some_steps(shape, free, device):
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("ends", [Wall.SLIP, Wall.OPEN], ids=["closed", "open"])
 def test_the_force_is_the_difference_between_cells(ends, axis, device):
-    """M a = (sum L V p below - above) / h, summed over the four nodes across a column one cell wide.
+    """M a = (P_c below - P_c above) times the cross-section, summed over the four nodes across a column one cell wide.
 
-    Particles lie anywhere in it. It holds next to closed ends too, where both force and sums are folded. Tents and
-    sums are NumPy's, the force is the solver's.
+    Particles lie anywhere in it. It holds next to closed ends too, where both force and pressure are folded: there the
+    wall holds the node, and the next one inside counts.
     """
     faces, cells = [Wall.SLIP] * 6, [1, 1, 1]
     cells[axis] = 9
@@ -226,12 +235,12 @@ def test_the_force_is_the_difference_between_cells(ends, axis, device):
     node = nodes(solver)[1:-1, 1:-1, 1:-1].astype(np.float64)
     across = tuple(other for other in range(3) if other != axis)
     force = (node[..., 3] * node[..., 4 + axis]).sum(axis=across)
-    values = particle_values(solver.state)
-    sums = tent_sums(scene.domain, values["position"], volumes(values) * values["pressure"])
-    work = mirrored_cells(sums, scene.walls)[1:-2, 1:-2, 1:-2].ravel()
-    assert np.ptp(work) > 0.1 * work.max()
-    largest = work.max() / SPACING[axis]
-    np.testing.assert_allclose(force[1:-1], -np.diff(work) / SPACING[axis], rtol=0, atol=SUMMED * largest)
+    assert_content_is_its_formula(solver)
+    pressure = cell_content(solver)[1:-2, 1:-2, 1:-2, PRESSURE].ravel()
+    assert np.ptp(pressure) > 0.1 * pressure.max()
+    area = scene.domain.cell_volume / SPACING[axis]
+    largest = pressure.max() * area
+    np.testing.assert_allclose(force[1:-1], -np.diff(pressure) * area, rtol=0, atol=SUMMED * largest)
 
 
 def test_evenly_filled_cells_are_at_rest(device):
@@ -261,9 +270,12 @@ def test_evenly_filled_cells_are_at_rest(device):
         state.particles.energy.fill_(1e6)
 
     solver = start(scene, device, prepare=fill_evenly)
-    np.testing.assert_allclose(cell_filling(solver)[:-1, :-1, :-1], 1.0, rtol=SUMMED)
+    held = cell_content(solver)[:-1, :-1, :-1]
+    pressure = (GAMMA - 1.0) * 1000.0 * 1e6
+    np.testing.assert_allclose(held[..., FILLING], 1.0, rtol=SUMMED)
+    np.testing.assert_allclose(held[..., PRESSURE], pressure, rtol=SUMMED)
     node = nodes(solver)[1:-1, 1:-1, 1:-1]
-    push = (GAMMA - 1.0) * 1000.0 * 1e6 * SPACING[1] * SPACING[2]
+    push = pressure * SPACING[1] * SPACING[2]
     assert np.abs(node[..., 3:4] * node[..., 4:7]).max() < SUMMED * push
     reactions = solver.state.reactions.numpy().reshape(-1, 6, 3).sum(axis=0)
     np.testing.assert_allclose(reactions[:2, 0], [push, -push], rtol=SUMMED)

@@ -1,12 +1,14 @@
-"""How full the cells are, by the measure that the internal force goes by.
+"""What the cells hold, by the measure that the internal force goes by.
 
-    J_c = sum over particles of L(x_p - x_c) V_p / V_c,    L the tent function (linear weights), x_c the cell's centre
+    P_c = sum over particles of L(x_p - x_c) V_p p_p / V_c,    J_c = sum of L(x_p - x_c) V_p / V_c,
 
-The slope of the quadratic B-spline is a difference of two tents, dw_i/dx = (L(x - x_{i-1/2}) - L(x - x_{i+1/2})) / h.
-Along an axis the force f_i = sum V_p p_p dw_i/dx on a node is therefore exactly the difference of sum L V_p p_p / h
-between the two cells that meet there, and gas at rest has the same sum in all cells, however its particles lie. If the
-volumes fill every cell by the same tents, J_c = 1, then the particles' pressures are equal too; volumes that fill the
-nodes by the shape function itself leave a pattern of several per cent in them.
+with L the tent function (linear weights) and x_c the cell's centre: the pressure of a cell and its filling. The slope
+of the quadratic B-spline is a difference of two tents, dw_i/dx = (L(x - x_{i-1/2}) - L(x - x_{i+1/2})) / h. So in a
+column one cell wide the force f_i = sum V_p p_p dw_i/dx on a node is exactly the difference of P between the two cells
+that meet there, and gas at rest has the same P in all cells, however its particles lie. If besides every cell is full,
+J = 1, and every particle has the pressure of the cells around it, then all particles have the same pressure; if
+volumes fill the *nodes* by the shape function instead, a pattern of several per cent is left in the pressures. In more
+dimensions the tents of one axis come with splines across, and this holds nearly.
 
 A cell has the index of the node at its lower corner. What was scattered behind a wall is folded back into the cell in
 front of it, which is the mirror image of the one behind.
@@ -21,6 +23,9 @@ from warp_mpm.kernels.walls import WALL_OPEN, Boundary, image_count, image_sides
 
 FULL = wp.constant(scalar(0.95))  # filling from which on a place is inside the material
 SPARSE = wp.constant(scalar(0.80))  # and up to which it is at a free surface
+
+PRESSURE = wp.constant(0)  # lanes of a cell's content
+FILLING = wp.constant(1)
 
 
 @wp.func
@@ -47,35 +52,36 @@ def tents(fraction: scalar) -> vector2:
 
 
 @wp.func
-def scatter_filling(grid: Grid, cell: wp.vec3s, fraction: vector3, volume: scalar):
-    """Particle -> cells: sum L V [m3]."""
+def scatter_content(grid: Grid, cell: wp.vec3s, fraction: vector3, pressure: scalar, volume: scalar):
+    """Particle -> cells: sum L V p [J] and sum L V [m3]."""
     lowest = lowest_cell(cell, fraction)
     first = node_index(grid, lowest[0], lowest[1], lowest[2])
     wx = tents(fraction[0])
     wy = tents(fraction[1])
     wz = tents(fraction[2])
+    value = vector2(pressure * volume, volume)
     for i in range(2):
         for j in range(2):
             row = first + i * grid.stride_x + j * grid.stride_y
             for k in range(2):
-                wp.atomic_add(grid.cell_filling, row + k, wx[i] * wy[j] * wz[k] * volume)
+                wp.atomic_add(grid.content, row + k, wx[i] * wy[j] * wz[k] * value)
 
 
 @wp.func
-def gather_filling(grid: Grid, cell: wp.vec3s, fraction: vector3) -> scalar:
-    """Filling of the cells around a particle, interpolated: sum L J_c."""
+def gather_content(grid: Grid, cell: wp.vec3s, fraction: vector3) -> vector2:
+    """Pressure [Pa] and filling of the cells around a particle, interpolated: sum L P_c, sum L J_c."""
     lowest = lowest_cell(cell, fraction)
     first = node_index(grid, lowest[0], lowest[1], lowest[2])
     wx = tents(fraction[0])
     wy = tents(fraction[1])
     wz = tents(fraction[2])
-    filling = ZERO
+    content = vector2()
     for i in range(2):
         for j in range(2):
             row = first + i * grid.stride_x + j * grid.stride_y
             for k in range(2):
-                filling += wx[i] * wy[j] * wz[k] * grid.cell_filling[row + k]
-    return filling
+                content += wx[i] * wy[j] * wz[k] * grid.content[row + k]
+    return content
 
 
 @wp.func
@@ -118,15 +124,15 @@ def image_cell(grid: Grid, cell: wp.vec3i, sides: wp.vec3i) -> int:
 
 @wp.func
 def solve_cell(grid: Grid, boundary: Boundary, cell: wp.vec3i):
-    """Sum of the scatter -> filling of a cell, and of its ghosts behind walls."""
+    """Sums of the scatter -> pressure and filling of a cell, and of its ghosts behind walls."""
     owned = owned_ghosts(boundary, grid.cells, cell)
-    total = ZERO
+    total = vector2()
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
-                total += grid.cell_filling[image_cell(grid, cell, image_sides(owned, i, j, k))]
-    filling = total / (grid.spacing[0] * grid.spacing[1] * grid.spacing[2])
+                total += grid.content[image_cell(grid, cell, image_sides(owned, i, j, k))]
+    content = total / (grid.spacing[0] * grid.spacing[1] * grid.spacing[2])
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
-                grid.cell_filling[image_cell(grid, cell, image_sides(owned, i, j, k))] = filling
+                grid.content[image_cell(grid, cell, image_sides(owned, i, j, k))] = content
