@@ -297,6 +297,8 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
     ):
         n = node_index(grid, index[0], index[1], index[2])
         mass = grid.node[n][3]
+        if mass == ZERO:  # nor has any particle a part in it
+            return
         owned = ghost_sides(boundary, grid.cells, index)
         free = free_components(boundary, grid.cells, index)
         total = grid.reprojected[n]

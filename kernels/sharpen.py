@@ -59,14 +59,35 @@ def neighbour(grid: Grid, boundary: Boundary, index: wp.vec3i, axis: int, side: 
 
 @wp.func
 def node_values(grid: Grid, n: int) -> vector8:
-    """The acceleration of a node, in the last lanes but one."""
+    """Mass and acceleration of a node, among its lanes."""
     return grid.node[n]
 
 
 @wp.func
 def step_velocities(grid: Grid, n: int) -> vector8:
-    """The velocities of a node that move the particles and do the work."""
-    return grid.kick[n]
+    """Mass of a node and its velocities that move the particles and do the work.
+
+    The mass is the node's: where there is none now, `kick` may be of an earlier step.
+    """
+    values = grid.kick[n]
+    values[3] = grid.node[n][3]
+    return values
+
+
+@wp.func
+def away_from_faces(cells: wp.vec3i, index: wp.vec3i) -> bool:
+    """Whether neither a node nor any neighbour lies on a face of the domain, or beyond."""
+    away = True
+    for axis in range(3):
+        if index[axis] < 2 or index[axis] > cells[axis] - 2:
+            away = False
+    return away
+
+
+@wp.func
+def pull(total: vector8, values: vector8, other: vector8) -> vector8:
+    """Total + min(M_i, M_j) (x_i - x_j), the masses in lane 3."""
+    return multiply_add8(total, wp.min(values[3], other[3]), values - other)
 
 
 @functools.cache
@@ -75,15 +96,24 @@ def excess_function(values_of: wp.Function) -> wp.Function:
 
     @wp.func
     def excess(grid: Grid, boundary: Boundary, index: wp.vec3i, strength: scalar) -> vector8:
-        values = values_of(grid, node_index(grid, index[0], index[1], index[2]))
+        n = node_index(grid, index[0], index[1], index[2])
+        values = values_of(grid, n)
         total = vector8()
-        for axis in range(3):
-            mass = mass_along(grid, boundary, index, axis)
-            for side in range(-1, 2, 2):
-                other = neighbour(grid, boundary, index, axis, side)
-                link = wp.min(mass, mass_along(grid, boundary, other, axis))
-                difference = values - values_of(grid, node_index(grid, other[0], other[1], other[2]))
-                total = multiply_add8(total, link, difference)
+        if away_from_faces(grid.cells, index):  # nearly everywhere
+            total = pull(total, values, values_of(grid, n - grid.stride_x))
+            total = pull(total, values, values_of(grid, n + grid.stride_x))
+            total = pull(total, values, values_of(grid, n - grid.stride_y))
+            total = pull(total, values, values_of(grid, n + grid.stride_y))
+            total = pull(total, values, values_of(grid, n - 1))
+            total = pull(total, values, values_of(grid, n + 1))
+        else:
+            for axis in range(3):
+                mass = mass_along(grid, boundary, index, axis)
+                for side in range(-1, 2, 2):
+                    other = neighbour(grid, boundary, index, axis, side)
+                    link = wp.min(mass, mass_along(grid, boundary, other, axis))
+                    difference = values - values_of(grid, node_index(grid, other[0], other[1], other[2]))
+                    total = multiply_add8(total, link, difference)
         return strength * total
 
     return excess
@@ -114,6 +144,8 @@ def sharpen_acceleration_kernel() -> wp.Kernel:
         force = vector3()
         added = vector3()
         free = free_components(boundary, grid.cells, index)
+        if node[3] == ZERO:
+            return
         if node[3] > grid.light_mass:
             excess = excess_of(grid, boundary, index, strength)
             force = vector3(excess[4], excess[5], excess[6])
@@ -163,6 +195,8 @@ def sharpen_velocity_kernel() -> wp.Kernel:
     def sharpen_node(grid: Grid, boundary: Boundary, strength: scalar, index: wp.vec3i):
         n = node_index(grid, index[0], index[1], index[2])
         mass = grid.node[n][3]
+        if mass == ZERO:
+            return
         values = grid.kick[n]
         if mass > grid.light_mass:
             free = twice(free_components(boundary, grid.cells, index))
