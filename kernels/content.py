@@ -19,7 +19,14 @@ import warp as wp
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector2, vector3
 from warp_mpm.kernels.records import Grid, node_index
 from warp_mpm.kernels.shape import linear_weight, offset_nearest_node
-from warp_mpm.kernels.walls import WALL_OPEN, Boundary, image_count, image_sides
+from warp_mpm.kernels.walls import (
+    Boundary,
+    image_count,
+    image_index,
+    image_sides,
+    in_front_of_walls,
+    mirrored_sides,
+)
 
 FULL = wp.constant(scalar(0.95))  # filling from which on a place is inside the material
 SPARSE = wp.constant(scalar(0.80))  # and up to which it is at a free surface
@@ -85,47 +92,29 @@ def gather_content(grid: Grid, cell: wp.vec3s, fraction: vector3) -> vector2:
 
 
 @wp.func
-def owned_ghosts(boundary: Boundary, cells: wp.vec3i, cell: wp.vec3i) -> wp.vec3i:
-    """Per axis, which ghosts behind walls belong to a cell: 1 behind the low face, 2 behind the high one, 3 both."""
-    owned = wp.vec3i()
-    for axis in range(3):
-        if cell[axis] == 0 and boundary.wall[2 * axis] != WALL_OPEN:
-            owned[axis] = owned[axis] + 1
-        if cell[axis] == cells[axis] - 1 and boundary.wall[2 * axis + 1] != WALL_OPEN:
-            owned[axis] = owned[axis] + 2
-    return owned
+def last_cell(cells: wp.vec3i) -> wp.vec3i:
+    """Index of the cell in the upper corner."""
+    return wp.vec3i(cells[0] - 1, cells[1] - 1, cells[2] - 1)
 
 
 @wp.func
 def stands_for_itself(boundary: Boundary, cells: wp.vec3i, cell: wp.vec3i) -> bool:
     """Whether there is such a cell, and it is no ghost behind a wall; those beyond open faces are free."""
-    stands = True
-    for axis in range(3):
-        if cell[axis] < 0 and boundary.wall[2 * axis] != WALL_OPEN:
-            stands = False
-        if cell[axis] == cells[axis] and boundary.wall[2 * axis + 1] != WALL_OPEN:
-            stands = False
-        if cell[axis] > cells[axis]:
-            stands = False
-    return stands
+    exists = cell[0] <= cells[0] and cell[1] <= cells[1] and cell[2] <= cells[2]
+    return exists and in_front_of_walls(boundary, last_cell(cells), cell)
 
 
 @wp.func
 def image_cell(grid: Grid, cell: wp.vec3i, sides: wp.vec3i) -> int:
     """Flat index of an image of a cell (see `walls.py`)."""
-    image = wp.vec3i(cell[0], cell[1], cell[2])
-    for axis in range(3):
-        if sides[axis] == 0:
-            image[axis] = -1
-        if sides[axis] == 1:
-            image[axis] = grid.cells[axis]
+    image = image_index(last_cell(grid.cells), cell, sides)
     return node_index(grid, image[0], image[1], image[2])
 
 
 @wp.func
 def solve_cell(grid: Grid, boundary: Boundary, cell: wp.vec3i):
     """Sums of the scatter -> pressure and filling of a cell, and of its ghosts behind walls."""
-    owned = owned_ghosts(boundary, grid.cells, cell)
+    owned = mirrored_sides(boundary, last_cell(grid.cells), cell, 0)
     total = vector2()
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):

@@ -2,7 +2,9 @@
 
 Composed from equation of state x burn law x shape x order of the step. The energy update conserves the total energy
 identically for FLIP with MUSL: the particles' kinetic energy changes by dt sum f . w with w = (v^n + v_r) / 2, v_r the
-re-projected velocity, so e loses (p + q)^n V^n dt div w, the very pressures and volumes of the force.
+re-projected velocity, so e loses (p + q)^n V^n dt div w, the very pressures and volumes of the force. The default
+transfer sharpens w and the velocity that moves the particles and changes their volumes (`sharpen.py`), and the
+viscosity is a tensor (`viscosity.py`): its work is s . (grad w) s.
 
 The conservative damping moves a particle's velocity vF by alpha of its distance u = sum w (v_r - vF) from what the
 grid sees, and returns the kinetic energy as heat: the node's share H (see `grid.py`) and
@@ -52,7 +54,7 @@ class Strain(Enum):
 class StrainIncrement:
     """What the gather brings to the material update."""
 
-    motion: vector3  # sum w (v^n + dt a), the velocity that moves the particle [m/s]
+    motion: vector3  # the velocity that moves the particle, sum w (v^n + dt a) or the sharpened one [m/s]
     acceleration: vector3  # in direction [m/s]: what the step adds to the velocity
     gradient: matrix3  # grad v [1/s], of the velocity that changes the volume
     work_gradient: matrix3  # of the velocity that does the work [1/s]

@@ -41,27 +41,42 @@ def wall_on(boundary: Boundary, cells: wp.vec3i, axis: int, index: int) -> int:
 
 
 @wp.func
-def ghost_sides(boundary: Boundary, cells: wp.vec3i, node: wp.vec3i) -> wp.vec3i:
-    """Per axis, which ghosts a node owns: 1 behind the low face, 2 behind the high one, 3 both."""
+def mirrored_sides(boundary: Boundary, last: wp.vec3i, index: wp.vec3i, inset: int) -> wp.vec3i:
+    """Per axis, behind which walls a place has a ghost: 1 the low one, 2 the high one, 3 both.
+
+    Places are numbered 0 to `last`; a ghost's image is `inset` places in: 1 for nodes, which may lie on a wall, else 0.
+    """
     sides = wp.vec3i()
     for axis in range(3):
-        if node[axis] == 1 and boundary.wall[2 * axis] != WALL_OPEN:
+        if index[axis] == inset and boundary.wall[2 * axis] != WALL_OPEN:
             sides[axis] = sides[axis] + 1
-        if node[axis] == cells[axis] - 1 and boundary.wall[2 * axis + 1] != WALL_OPEN:
+        if index[axis] == last[axis] - inset and boundary.wall[2 * axis + 1] != WALL_OPEN:
             sides[axis] = sides[axis] + 2
     return sides
 
 
 @wp.func
+def in_front_of_walls(boundary: Boundary, last: wp.vec3i, index: wp.vec3i) -> bool:
+    """Whether a place is no ghost behind a wall; places beyond open faces are none."""
+    in_front = True
+    for axis in range(3):
+        if index[axis] < 0 and boundary.wall[2 * axis] != WALL_OPEN:
+            in_front = False
+        if index[axis] > last[axis] and boundary.wall[2 * axis + 1] != WALL_OPEN:
+            in_front = False
+    return in_front
+
+
+@wp.func
+def ghost_sides(boundary: Boundary, cells: wp.vec3i, node: wp.vec3i) -> wp.vec3i:
+    """Per axis, which ghosts a node owns: 1 behind the low face, 2 behind the high one, 3 both."""
+    return mirrored_sides(boundary, cells, node, 1)
+
+
+@wp.func
 def is_owner(boundary: Boundary, cells: wp.vec3i, node: wp.vec3i) -> bool:
     """Whether a node stands for itself: ghosts behind walls do not, nodes beyond open faces do."""
-    owner = True
-    for axis in range(3):
-        if node[axis] < 0 and boundary.wall[2 * axis] != WALL_OPEN:
-            owner = False
-        if node[axis] > cells[axis] and boundary.wall[2 * axis + 1] != WALL_OPEN:
-            owner = False
-    return owner
+    return in_front_of_walls(boundary, cells, node)
 
 
 @wp.func
@@ -101,21 +116,21 @@ def image_sides(owned: wp.vec3i, i: int, j: int, k: int) -> wp.vec3i:
 
 
 @wp.func
-def image_index(grid: Grid, node: wp.vec3i, sides: wp.vec3i) -> wp.vec3i:
-    """Index of an image."""
-    image = wp.vec3i(node[0], node[1], node[2])
+def image_index(last: wp.vec3i, index: wp.vec3i, sides: wp.vec3i) -> wp.vec3i:
+    """Index of an image of a place; places are numbered 0 to `last`."""
+    image = wp.vec3i(index[0], index[1], index[2])
     for axis in range(3):
         if sides[axis] == 0:
             image[axis] = -1
         if sides[axis] == 1:
-            image[axis] = grid.cells[axis] + 1
+            image[axis] = last[axis] + 1
     return image
 
 
 @wp.func
 def image_node(grid: Grid, node: wp.vec3i, sides: wp.vec3i) -> int:
     """Flat index of an image."""
-    image = image_index(grid, node, sides)
+    image = image_index(grid.cells, node, sides)
     return node_index(grid, image[0], image[1], image[2])
 
 
