@@ -39,9 +39,10 @@ def arrival_time(ignition: Ignition, position: vector3, detonation_speed: scalar
 @wp.func
 def particle_position(particles: Particles, grid: Grid, p: int) -> vector3:
     """Position of a particle relative to the domain's lower corner [m]."""
-    cell = particles.cell[p]
+    position = particles.position[p]
+    cell = position.cell
     whole = vector3(scalar(cell[0]), scalar(cell[1]), scalar(cell[2]))
-    return wp.cw_mul(whole + particles.fraction[p], grid.spacing)
+    return wp.cw_mul(whole + position.fraction, grid.spacing)
 
 
 @wp.kernel(enable_backward=False)
@@ -49,12 +50,12 @@ def light(particles: Particles, grid: Grid, ignitions: wp.array(dtype=Ignition),
     """Arrival and booster times of particles from the detonators that light them."""
     p = begin + wp.tid()
     position = particle_position(particles, grid, p)
-    arrival = particles.arrival_time[p]
-    booster = particles.booster_time[p]
+    arrival = particles.burn_times[p].arrival_time
+    booster = particles.burn_times[p].booster_time
     for n in range(ignitions.shape[0]):
         ignition = ignitions[n]
         arrival = wp.min(arrival, arrival_time(ignition, position, detonation_speed))
         if ignition.booster_radius > ZERO and distance_to(ignition, position) <= ignition.booster_radius:
             booster = wp.min(booster, ignition.time)
-    particles.arrival_time[p] = arrival
-    particles.booster_time[p] = booster
+    particles.burn_times[p].arrival_time = arrival
+    particles.burn_times[p].booster_time = booster

@@ -15,21 +15,25 @@ NODES = wp.constant(64)  # of a block
 
 
 @wp.func
-def last_block(blocks: int, lowest: int) -> int:
-    """Last block along an axis that a stencil reaches, and the ghost that its last node may own, two nodes further."""
-    return wp.min((lowest + 1 + STENCIL - 1 + GHOST_REACH) // EDGE, blocks - 1)
+def reached_block(blocks: int, lowest: int, last: int) -> int:
+    """First block along an axis that a stencil reaches, or (`last` = 1) that of its last node's ghost behind a wall."""
+    return wp.min((lowest + 1 + last * (STENCIL - 1 + GHOST_REACH)) // EDGE, blocks - 1)
 
 
 @wp.func
 def stamp_blocks(grid: Grid, lowest: wp.vec3i, step: int):
     """Say that a stencil of three nodes per axis, the lowest given, was scattered to in a step.
 
-    That covers every shape function's nodes, and the cells of the field.
+    That covers every shape function's nodes, and the cells of the field. What is reached lies in one block or two along
+    an axis: eight writes, some of them twice, without a branch (one per particle is slower than the writes).
     """
-    for i in range((lowest[0] + 1) // EDGE, last_block(grid.blocks[0], lowest[0]) + 1):
-        for j in range((lowest[1] + 1) // EDGE, last_block(grid.blocks[1], lowest[1]) + 1):
-            for k in range((lowest[2] + 1) // EDGE, last_block(grid.blocks[2], lowest[2]) + 1):
-                grid.stamps[(i * grid.blocks[1] + j) * grid.blocks[2] + k] = step
+    for i in range(2):
+        for j in range(2):
+            for k in range(2):
+                x = reached_block(grid.blocks[0], lowest[0], i)
+                y = reached_block(grid.blocks[1], lowest[1], j)
+                z = reached_block(grid.blocks[2], lowest[2], k)
+                grid.stamps[(x * grid.blocks[1] + y) * grid.blocks[2] + z] = step
 
 
 @wp.func

@@ -18,7 +18,8 @@ import warp as wp
 
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector2, vector3
 from warp_mpm.kernels.records import Grid, node_index
-from warp_mpm.kernels.shape import linear_weight, offset_nearest_node
+from warp_mpm.kernels.shape import offset_nearest_node
+from warp_mpm.kernels.stencil import gather_function, scatter_function, stencil_type
 from warp_mpm.kernels.walls import (
     Boundary,
     image_count,
@@ -30,6 +31,7 @@ from warp_mpm.kernels.walls import (
 
 FULL = wp.constant(scalar(0.95))  # filling from which on a place is inside the material
 SPARSE = wp.constant(scalar(0.80))  # and up to which it is at a free surface
+PER_RISE = wp.constant(scalar(1.0 / 0.15))  # 1 / (FULL - SPARSE): a division takes as long as ten products
 
 PRESSURE = wp.constant(0)  # lanes of a cell's content
 FILLING = wp.constant(1)
@@ -38,7 +40,7 @@ FILLING = wp.constant(1)
 @wp.func
 def inside(filling: scalar) -> scalar:
     """1 inside the material, 0 at a free surface, by the filling of a cell or a node."""
-    return wp.clamp((filling - SPARSE) / (FULL - SPARSE), ZERO, ONE)
+    return wp.clamp((filling - SPARSE) * PER_RISE, ZERO, ONE)
 
 
 @wp.func
@@ -54,41 +56,39 @@ def lowest_cell(cell: wp.vec3s, fraction: vector3) -> wp.vec3i:
 @wp.func
 def tents(fraction: scalar) -> vector2:
     """Linear weights, along an axis, of the two cells whose centres surround a particle."""
-    distance = fraction - HALF - scalar(offset_nearest_node(fraction))
-    return vector2(linear_weight(distance, HALF), linear_weight(distance - ONE, HALF))
+    upper = fraction - HALF - scalar(offset_nearest_node(fraction))
+    return vector2(ONE - upper, upper)
+
+
+Tents = stencil_type(2)
+gather_cells = gather_function(2, 2)
+scatter_cells = scatter_function(2, 2)
+
+
+@wp.func
+def tents_around(grid: Grid, cell: wp.vec3s, fraction: vector3) -> Tents:
+    """The stencil of the eight cells whose centres surround a particle."""
+    lowest = lowest_cell(cell, fraction)
+    stencil = Tents()
+    stencil.first = node_index(grid, lowest[0], lowest[1], lowest[2])
+    stencil.stride_x = grid.stride_x
+    stencil.stride_y = grid.stride_y
+    stencil.wx = tents(fraction[0])
+    stencil.wy = tents(fraction[1])
+    stencil.wz = tents(fraction[2])
+    return stencil
 
 
 @wp.func
 def scatter_content(grid: Grid, cell: wp.vec3s, fraction: vector3, pressure: scalar, volume: scalar):
     """Particle -> cells: sum L V p [J] and sum L V [m3]."""
-    lowest = lowest_cell(cell, fraction)
-    first = node_index(grid, lowest[0], lowest[1], lowest[2])
-    wx = tents(fraction[0])
-    wy = tents(fraction[1])
-    wz = tents(fraction[2])
-    value = vector2(pressure * volume, volume)
-    for i in range(2):
-        for j in range(2):
-            row = first + i * grid.stride_x + j * grid.stride_y
-            for k in range(2):
-                wp.atomic_add(grid.content, row + k, wx[i] * wy[j] * wz[k] * value)
+    scatter_cells(tents_around(grid, cell, fraction), grid.content, vector2(pressure * volume, volume))
 
 
 @wp.func
 def gather_content(grid: Grid, cell: wp.vec3s, fraction: vector3) -> vector2:
     """Pressure [Pa] and filling of the cells around a particle, interpolated: sum L P_c, sum L J_c."""
-    lowest = lowest_cell(cell, fraction)
-    first = node_index(grid, lowest[0], lowest[1], lowest[2])
-    wx = tents(fraction[0])
-    wy = tents(fraction[1])
-    wz = tents(fraction[2])
-    content = vector2()
-    for i in range(2):
-        for j in range(2):
-            row = first + i * grid.stride_x + j * grid.stride_y
-            for k in range(2):
-                content += wx[i] * wy[j] * wz[k] * grid.content[row + k]
-    return content
+    return gather_cells(tents_around(grid, cell, fraction), grid.content)
 
 
 @wp.func

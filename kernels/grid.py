@@ -8,9 +8,9 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
 from warp_mpm.kernels.content import inside, solve_cell, stands_for_itself
-from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector2, vector3, vector4, vector8
+from warp_mpm.kernels.node_pass import Phase, node_kernel
+from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, scalar, vector2, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index, raise_maximum
 from warp_mpm.kernels.vectors import first_three, second_three
 from warp_mpm.kernels.walls import (
@@ -27,20 +27,26 @@ from warp_mpm.kernels.walls import (
 )
 
 
-@wp.kernel(enable_backward=False)
-def clear(grid: Grid, clock: wp.array(dtype=Clock), begin: int):
+@wp.func
+def clear_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+    """Empty a node."""
+    grid.node[n] = vector8()
+    grid.pressure[n] = ZERO
+    grid.content[n] = vector2()
+    grid.reprojected[n] = vector4()
+    if grid.kick.shape[0] > 0:
+        grid.kick[n] = vector8()
+
+
+@wp.func
+def clear_node(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, index: wp.vec3i):
+    """Empty a node, wherever it is."""
+    clear_inside(grid, boundary, now, phase, slot, node_index(grid, index[0], index[1], index[2]))
+
+
+def clear_kernel() -> wp.Kernel:
     """Empty the nodes of the blocks that the last scatter, one step ago, wrote to."""
-    thread = wp.tid()
-    block = begin + thread // grid.workers
-    if is_active(grid, block, clock[0].step - 1):
-        for n in range(thread % grid.workers, NODES, grid.workers):
-            index = node_of_block(grid, block, n)
-            if on_grid(grid, index):
-                m = node_index(grid, index[0], index[1], index[2])
-                grid.node[m] = vector8()
-                grid.pressure[m] = ZERO
-                grid.content[m] = vector2()
-                grid.reprojected[m] = vector4()
+    return node_kernel(clear_node, clear_inside, 1)
 
 
 @wp.func
@@ -164,10 +170,7 @@ def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
     def solve_node(
         grid: Grid,
         boundary: Boundary,
-        pic_share: scalar,
-        reactions: wp.array(dtype=wp.float64),
-        impulses: wp.array(dtype=wp.float64),
-        peaks: wp.array(dtype=scalar),
+        phase: Phase,
         slot: int,
         index: wp.vec3i,
     ):
@@ -197,43 +200,56 @@ def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
             pressure = pressure_volume / occupied_volume(grid, index, filling)
             if not beyond_face(grid, index):
                 if filling >= HALF:
-                    raise_maximum(peaks, slot, pressure)
+                    raise_maximum(phase.peaks, slot, pressure)
             elif filling > ZERO:
                 pressure = pressure_volume / (node_volume(grid, index) * filling)
         if ghosts or free[0] * free[1] * free[2] == ZERO:
             if wp.static(force):
-                tally_walls(grid, boundary, index, owned, True, mass, ONE, acceleration, reactions, slot)
-            if wp.static(momentum) and pic_share > ZERO:
-                tally_walls(grid, boundary, index, owned, False, mass, pic_share, velocity, impulses, slot)
+                tally_walls(grid, boundary, index, owned, True, mass, ONE, acceleration, phase.reactions, slot)
+            if wp.static(momentum) and phase.pic_share > ZERO:
+                tally_walls(grid, boundary, index, owned, False, mass, phase.pic_share, velocity, phase.impulses, slot)
             mirror(grid, boundary, index, owned, velocity, acceleration, filling, pressure)
         grid.node[n] = vector8(
             velocity[0], velocity[1], velocity[2], mass, acceleration[0], acceleration[1], acceleration[2], filling
         )
         grid.pressure[n] = pressure
 
-    @wp.kernel(enable_backward=False, module="unique")
-    def solve(
-        grid: Grid,
-        boundary: Boundary,
-        clock: wp.array(dtype=Clock),
-        pic_share: scalar,
-        reactions: wp.array(dtype=wp.float64),
-        impulses: wp.array(dtype=wp.float64),
-        peaks: wp.array(dtype=scalar),
-        slot: int,
-        begin: int,
-    ):
-        thread = wp.tid()
-        block = begin + thread // grid.workers
-        if is_active(grid, block, clock[0].step):
-            for n in range(thread % grid.workers, NODES, grid.workers):
-                index = node_of_block(grid, block, n)
-                if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
-                    solve_node(grid, boundary, pic_share, reactions, impulses, peaks, slot, index)
-                if wp.static(cells) and stands_for_itself(boundary, grid.cells, index):
-                    solve_cell(grid, boundary, index)
+    @wp.func
+    def visit(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, index: wp.vec3i):
+        if is_owner(boundary, grid.cells, index):
+            solve_node(grid, boundary, phase, slot, index)
+        if wp.static(cells) and stands_for_itself(boundary, grid.cells, index):
+            solve_cell(grid, boundary, index)
 
-    return solve
+    @wp.func
+    def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+        node = grid.node[n]
+        mass = node[3]
+        if mass == ZERO:
+            return
+        per_volume = grid.inverse_spacing[0] * grid.inverse_spacing[1] * grid.inverse_spacing[2]
+        if wp.static(cells):
+            grid.content[n] = per_volume * grid.content[n]
+        inverse = wp.where(mass > grid.light_mass, ONE / mass, ZERO)
+        velocity = first_three(node)
+        filling = node[7]
+        if wp.static(momentum):
+            velocity = inverse * velocity
+            filling = per_volume * filling
+        acceleration = vector3()
+        if wp.static(force):
+            if mass > grid.light_mass:
+                acceleration = inverse * second_three(node) + boundary.gravity
+            share = inside(filling)
+            pressure = inverse * mass * per_volume * grid.pressure[n] / (share * filling + ONE - share)
+            grid.pressure[n] = pressure
+            if filling >= HALF:
+                raise_maximum(phase.peaks, slot, pressure)
+        grid.node[n] = vector8(
+            velocity[0], velocity[1], velocity[2], mass, acceleration[0], acceleration[1], acceleration[2], filling
+        )
+
+    return node_kernel(visit, visit_inside, 0)
 
 
 @wp.kernel(enable_backward=False)
@@ -289,16 +305,16 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
     def solve_node(
         grid: Grid,
         boundary: Boundary,
-        alpha: scalar,
-        dt: scalar,
-        impulses: wp.array(dtype=wp.float64),
+        now: Clock,
+        phase: Phase,
         slot: int,
         index: wp.vec3i,
     ):
         n = node_index(grid, index[0], index[1], index[2])
         mass = grid.node[n][3]
-        if mass == ZERO:  # nor has any particle a part in it
+        if mass == ZERO or not is_owner(boundary, grid.cells, index):
             return
+        alpha = now.damping
         owned = ghost_sides(boundary, grid.cells, index)
         free = free_components(boundary, grid.cells, index)
         total = grid.reprojected[n]
@@ -306,7 +322,7 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
             total = fold_reprojected(grid, boundary, index, owned)
         inverse = wp.where(mass > grid.light_mass, ONE / mass, ZERO)
         velocity = wp.cw_mul(free, vector3(total[0], total[1], total[2])) * inverse
-        heat = alpha * wp.max(total[3] * inverse - HALF * wp.dot(velocity, velocity), ZERO)
+        heat = alpha * wp.max(TWO * total[3] * inverse - wp.dot(velocity, velocity), ZERO)
         for i in range(image_count(owned[0])):
             for j in range(image_count(owned[1])):
                 for k in range(image_count(owned[2])):
@@ -316,24 +332,18 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
                         x = grid.reprojected[m]
                         momentum = alpha * vector3(x[0], x[1], x[2])
                         value = alpha * grid.node[m][3] * velocity
-                        tally_reaction(boundary, grid, index, sides, momentum, vector3(), value, impulses, slot)
-                    write(grid, m, image_signs(boundary, sides), velocity, heat, dt)
+                        tally_reaction(boundary, grid, index, sides, momentum, vector3(), value, phase.impulses, slot)
+                    write(grid, m, image_signs(boundary, sides), velocity, heat, now.dt)
 
-    @wp.kernel(enable_backward=False, module="unique")
-    def solve_reprojected(
-        grid: Grid,
-        boundary: Boundary,
-        clock: wp.array(dtype=Clock),
-        impulses: wp.array(dtype=wp.float64),
-        slot: int,
-        begin: int,
-    ):
-        thread = wp.tid()
-        block = begin + thread // grid.workers
-        if is_active(grid, block, clock[0].step - 1):
-            for n in range(thread % grid.workers, NODES, grid.workers):
-                index = node_of_block(grid, block, n)
-                if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
-                    solve_node(grid, boundary, clock[0].damping, clock[0].dt, impulses, slot, index)
+    @wp.func
+    def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+        mass = grid.node[n][3]
+        if mass == ZERO:
+            return
+        total = grid.reprojected[n]
+        inverse = wp.where(mass > grid.light_mass, ONE / mass, ZERO)
+        velocity = inverse * first_three(total)
+        heat = now.damping * wp.max(TWO * total[3] * inverse - wp.dot(velocity, velocity), ZERO)
+        write(grid, n, vector3(ONE, ONE, ONE), velocity, heat, now.dt)
 
-    return solve_reprojected
+    return node_kernel(solve_node, visit_inside, 1)

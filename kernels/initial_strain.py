@@ -4,10 +4,10 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.material import Strain, strain_function
 from warp_mpm.kernels.precision import ZERO, scalar
 from warp_mpm.kernels.records import STRAIN_RATE, Grid, Maxima, Particles, raise_maxima
 from warp_mpm.kernels.shape import Shape
+from warp_mpm.kernels.strain import Strain, strain_function
 
 
 @functools.cache
@@ -20,7 +20,9 @@ def initial_strain_kernel(shape: Shape) -> wp.Kernel:
         particles: Particles, grid: Grid, half_width: scalar, maxima: wp.array(dtype=Maxima), slab: int, begin: int
     ):
         p = begin + wp.tid()
-        strain = gather_strain(grid, particles.cell[p], particles.fraction[p], particles.velocity[p], half_width, ZERO)
+        position = particles.position[p]
+        velocity = particles.motion[p].velocity
+        strain = gather_strain(grid, position.cell, position.fraction, velocity, half_width, ZERO)
         rates = Maxima()
         rates[STRAIN_RATE] = wp.abs(wp.trace(strain.gradient))
         raise_maxima(maxima, slab, rates)

@@ -14,6 +14,7 @@ from warp_mpm.kernels.records import (
     Grid,
     Maxima,
     Particles,
+    Position,
     raise_maxima,
 )
 from warp_mpm.kernels.shape import Shape
@@ -130,12 +131,14 @@ def settle(
         return True
     if after.left_through >= 0:
         tally_outflow(mass, velocity, energy, after.left_through, slab, tallies)
-        particles.mass[p] = ZERO
-        particles.pressure[p] = ZERO
-        particles.viscous_pressure[p] = ZERO
+        particles.motion[p].mass = ZERO
+        particles.matter[p].pressure = ZERO
+        particles.matter[p].viscous_pressure = ZERO
         return False
-    particles.cell[p] = wp.vec3s(wp.int16(after.cell[0]), wp.int16(after.cell[1]), wp.int16(after.cell[2]))
-    particles.fraction[p] = after.fraction
+    position = Position()
+    position.cell = wp.vec3s(wp.int16(after.cell[0]), wp.int16(after.cell[1]), wp.int16(after.cell[2]))
+    position.fraction = after.fraction
+    particles.position[p] = position
     return True
 
 
@@ -158,16 +161,16 @@ def move_kernel(shape: Shape) -> wp.Kernel:
         begin: int,
     ):
         p = begin + wp.tid()
-        mass = particles.mass[p]
-        if mass == ZERO:
+        motion = particles.motion[p]
+        if motion.mass == ZERO:
             return
-        cell = particles.cell[p]
-        fraction = particles.fraction[p]
-        step = displacement(grid, cell, fraction, half_width, clock[0].dt)
-        after = place(grid.cells, faces, cell, fraction, step)
+        position = particles.position[p]
+        step = displacement(grid, position.cell, position.fraction, half_width, clock[0].dt)
+        after = place(grid.cells, faces, position.cell, position.fraction, step)
         moved = Maxima()
         moved[DISPLACEMENT] = after.moved
         raise_maxima(maxima, slab, moved)
-        settle(particles, p, after, mass, particles.velocity[p], particles.energy[p], slab, tallies, faults)
+        energy = particles.matter[p].energy
+        settle(particles, p, after, motion.mass, motion.velocity, energy, slab, tallies, faults)
 
     return move

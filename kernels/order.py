@@ -14,8 +14,15 @@ class Slabs:
     """How the domain is cut into slabs of whole cells."""
 
     axis: int
-    thickness: int  # cells
+    count: int
+    cells: int  # of the domain along the axis, shared out evenly
     charges: int
+
+
+@wp.func
+def slab_of(slabs: Slabs, cell: int) -> int:
+    """The slab of a cell, by its index along the axis."""
+    return cell * slabs.count // slabs.cells
 
 
 @wp.kernel(enable_backward=False)
@@ -29,13 +36,13 @@ def sort_keys(
 ):
     """Key of each particle: (slab x charges + charge) x cells + cell. Particles that left come last."""
     p = wp.tid()
-    cell = particles.cell[p]
+    cell = particles.position[p].cell
     cells = wp.int64(grid.cells[0]) * wp.int64(grid.cells[1]) * wp.int64(grid.cells[2])
     flat = (wp.int64(cell[0]) * wp.int64(grid.cells[1]) + wp.int64(cell[1])) * wp.int64(grid.cells[2])
     flat = flat + wp.int64(cell[2])
-    slab = int(cell[slabs.axis]) // slabs.thickness
-    if particles.mass[p] == ZERO:
-        slab = grid.cells[slabs.axis] // slabs.thickness + 1
+    slab = slab_of(slabs, int(cell[slabs.axis]))
+    if particles.motion[p].mass == ZERO:
+        slab = slabs.count
     keys[p] = (wp.int64(slab) * wp.int64(slabs.charges) + wp.int64(charge[particles.index[p]])) * cells + flat
     order[p] = p
 

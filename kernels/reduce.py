@@ -5,7 +5,6 @@ import warp as wp
 from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import (
-    BURN_SPEED,
     DISPLACEMENT,
     SIGNAL_SPEED,
     SPEED_X,
@@ -62,10 +61,9 @@ def start_step(
     damping k; 0 without it, as walls act on what it moves.
     """
     now = clock[0]
-    burn_speed = largest(maxima, slabs, BURN_SPEED)
     rate = largest(maxima, slabs, VISCOUS_RATE)
     for axis in range(3):
-        rate = wp.max(rate, wp.max(largest(maxima, slabs, SPEED_X + axis), burn_speed) / spacing[axis])
+        rate = wp.max(rate, largest(maxima, slabs, SPEED_X + axis) / spacing[axis])
     dt = wp.min(cfl / wp.max(rate, TINY), LARGEST_STRAIN / wp.max(largest(maxima, slabs, STRAIN_RATE), TINY))
     if now.step > 0:
         dt = wp.min(dt, GROWTH * now.dt)
@@ -129,21 +127,24 @@ def audit_particles(
 ):
     """Sum mass, momentum, energies and volume of the particles, in double."""
     p = begin + wp.tid()
-    mass = wp.float64(particles.mass[p])
-    velocity = particles.velocity[p]
+    motion = particles.motion[p]
+    matter = particles.matter[p]
+    position = particles.position[p]
+    mass = wp.float64(motion.mass)
+    velocity = motion.velocity
     lane = slab * AUDIT
     add_audit(sums, lane + AUDIT_MASS, mass)
     for axis in range(3):
         add_audit(sums, lane + AUDIT_MOMENTUM + axis, mass * wp.float64(velocity[axis]))
     add_audit(sums, lane + AUDIT_ABSOLUTE_MOMENTUM, mass * wp.float64(wp.length(velocity)))
     add_audit(sums, lane + AUDIT_KINETIC, mass * wp.float64(HALF * wp.dot(velocity, velocity)))
-    add_audit(sums, lane + AUDIT_INTERNAL, mass * wp.float64(particles.energy[p]))
-    if particles.burn_fraction.shape[0] > 0:
-        burnt = wp.float64(particles.burn_fraction[p])
+    add_audit(sums, lane + AUDIT_INTERNAL, mass * wp.float64(matter.energy))
+    if particles.burn_times.shape[0] > 0:
+        burnt = wp.float64(matter.burn_fraction)
         add_audit(sums, lane + AUDIT_RELEASED, mass * burnt * wp.float64(initial_energy))
-    add_audit(sums, lane + AUDIT_VOLUME, mass / wp.float64(particles.density[p]))
+    add_audit(sums, lane + AUDIT_VOLUME, mass / wp.float64(matter.density))
     for axis in range(3):
-        place = wp.float64(particles.cell[p][axis]) + wp.float64(particles.fraction[p][axis])
+        place = wp.float64(position.cell[axis]) + wp.float64(position.fraction[axis])
         add_audit(sums, lane + AUDIT_POSITION + axis, mass * place * wp.float64(spacing[axis]))
 
 

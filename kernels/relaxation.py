@@ -7,10 +7,31 @@ relaxation changes what is shown but no motion. What was measured is in docs/num
 
 import warp as wp
 
-from warp_mpm.kernels.precision import HALF, ONE, scalar
+from warp_mpm.kernels.precision import HALF, ONE, TWO, scalar
 
 RELAXATION = wp.constant(scalar(0.6))  # towards full cells, per cell that sound crosses
+THIRD = wp.constant(scalar(1.0 / 3.0))
+FIFTH = wp.constant(scalar(0.2))
+TWELFTH = wp.constant(scalar(1.0 / 12.0))
 EQUALISATION = wp.constant(scalar(0.25))  # towards the pressure around, likewise
+
+
+@wp.func
+def logarithm(value: scalar) -> scalar:
+    """The natural logarithm near 1, by its series in u = (x - 1) / (x + 1): to 3e-4 of itself from 1/2 to 2.
+
+    A call of the library's would cost a fifth of the material update, and no more is asked of a rate of relaxation.
+    """
+    u = (value - ONE) / (value + ONE)
+    return TWO * u * (ONE + u * u * (THIRD + FIFTH * u * u))
+
+
+@wp.func
+def exponential(value: scalar) -> scalar:
+    """The exponential of small numbers, by the (2, 2) Pade approximant: to round-off up to 0.1, to 4e-6 up to 0.3."""
+    even = ONE + TWELFTH * value * value
+    odd = HALF * value
+    return (even + odd) / (even - odd)
 
 
 @wp.func
@@ -22,6 +43,6 @@ def relax_density(density: scalar, filling: scalar, excess: scalar, crossing: sc
     """
     filling_rate = RELAXATION * crossing
     pressure_rate = EQUALISATION * crossing
-    exponent = wp.log(wp.max(filling, HALF)) * filling_rate / (ONE + filling_rate)
-    exponent -= wp.clamp(excess, -HALF, HALF) * pressure_rate / (ONE + pressure_rate)
-    return density * wp.exp(exponent)
+    exponent = logarithm(wp.max(filling, HALF)) * filling_rate * (ONE + pressure_rate)
+    exponent -= wp.clamp(excess, -HALF, HALF) * pressure_rate * (ONE + filling_rate)
+    return density * exponential(exponent / ((ONE + filling_rate) * (ONE + pressure_rate)))

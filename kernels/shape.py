@@ -1,9 +1,9 @@
 """Shape functions: how a particle's extent is spread over the nodes, one axis at a time.
 
 A particle sits at `fraction` (0 <= f < 1) of its cell. Along an axis its stencil is `width` consecutive nodes, the
-first one `offset(f)` nodes from the cell's lower node. `weight(s, l)` and `slope(s, l)` = dw/ds take the distance
-s = (particle - node) / spacing and the particle's half width l in cells (used by GIMP alone). `affine(s, l, f)` is the
-weight with which APIC measures the velocity gradient, w s / sum(w s^2) up to sign, in 1 / cell.
+first one `offset(f)` nodes from the cell's lower node. `weights(f, l)` and `slopes(f, l)` are those of all its nodes;
+l is the particle's half width in cells (used by GIMP alone), slopes are dw/ds, s = (particle - node) / spacing.
+`affine(f, l)` are the weights with which APIC measures the velocity gradient, w s / sum(w s^2) up to sign, in 1 / cell.
 
 All weights sum to one and reproduce linear fields (tested for every member of `SHAPES`).
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warp_mpm.kernels.precision import FOUR, HALF, ONE, THREE_QUARTERS, TWO, ZERO, scalar
+from warp_mpm.kernels.precision import FOUR, HALF, ONE, THREE_QUARTERS, TWO, ZERO, scalar, vector2, vector3
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Shape:
     name: str
     width: int  # nodes per axis
     offset: wp.Function  # (fraction) -> int
-    weight: wp.Function  # (distance, half_width) -> scalar
-    slope: wp.Function  # (distance, half_width) -> scalar, derivative of the weight by the distance
-    affine: wp.Function  # (distance, half_width, fraction) -> scalar
+    weights: wp.Function  # (fraction, half_width) -> vector of `width`
+    slopes: wp.Function  # (fraction, half_width) -> vector of `width`, derivatives by the distance
+    affine: wp.Function  # (fraction, half_width) -> vector of `width`
     spread: float  # second moment of the weights [cells^2] that sharpening takes back (see `sharpen.py`)
 
 
@@ -41,43 +41,50 @@ def offset_nearest_node(fraction: scalar) -> int:
 
 
 @wp.func
-def linear_weight(distance: scalar, half_width: scalar) -> scalar:
+def from_nearest_node(fraction: scalar) -> scalar:
+    """Distance of a particle from the nearest node [cells], -1/2 to 1/2."""
+    return wp.where(fraction < HALF, fraction, fraction - ONE)
+
+
+@wp.func
+def linear_weights(fraction: scalar, half_width: scalar) -> vector2:
     """Tent function: 1 - |s|."""
-    return wp.max(ONE - wp.abs(distance), ZERO)
+    return vector2(ONE - fraction, fraction)
 
 
 @wp.func
-def linear_slope(distance: scalar, half_width: scalar) -> scalar:
+def linear_slopes(fraction: scalar, half_width: scalar) -> vector2:
     """-sign(s): one-sided at a node, where the particle belongs to the cell above."""
-    return wp.where(distance < ZERO, ONE, -ONE)
+    return vector2(-ONE, ONE)
 
 
 @wp.func
-def linear_affine(distance: scalar, half_width: scalar, fraction: scalar) -> scalar:
+def linear_affine(fraction: scalar, half_width: scalar) -> vector2:
     """W s / (f (1 - f)), which is the slope itself."""
-    return linear_slope(distance, half_width)
+    return vector2(-ONE, ONE)
 
 
 @wp.func
-def bspline_weight(distance: scalar, half_width: scalar) -> scalar:
-    """Quadratic B-spline (Steffen, Kirby, Berzins 2008, eq. 21)."""
-    s = wp.abs(distance)
-    outer = scalar(1.5) - s
-    return wp.where(s < HALF, THREE_QUARTERS - s * s, HALF * outer * outer)
+def bspline_weights(fraction: scalar, half_width: scalar) -> vector3:
+    """Quadratic B-spline (Steffen, Kirby, Berzins 2008, eq. 21): 3/4 - s^2 near a node, (3/2 - |s|)^2 / 2 farther."""
+    s = from_nearest_node(fraction)
+    below = HALF - s
+    above = HALF + s
+    return vector3(HALF * below * below, THREE_QUARTERS - s * s, HALF * above * above)
 
 
 @wp.func
-def bspline_slope(distance: scalar, half_width: scalar) -> scalar:
-    """Derivative of the quadratic B-spline."""
-    s = wp.abs(distance)
-    outer = wp.where(distance < ZERO, scalar(1.5) - s, s - scalar(1.5))
-    return wp.where(s < HALF, -TWO * distance, outer)
+def bspline_slopes(fraction: scalar, half_width: scalar) -> vector3:
+    """Derivatives of the quadratic B-spline."""
+    s = from_nearest_node(fraction)
+    return vector3(s - HALF, -TWO * s, s + HALF)
 
 
 @wp.func
-def bspline_affine(distance: scalar, half_width: scalar, fraction: scalar) -> scalar:
+def bspline_affine(fraction: scalar, half_width: scalar) -> vector3:
     """-4 w s: the second moment of the quadratic B-spline is 1/4 cell^2 everywhere (Jiang et al. 2015)."""
-    return -FOUR * distance * bspline_weight(distance, half_width)
+    s = from_nearest_node(fraction)
+    return -FOUR * wp.cw_mul(bspline_weights(fraction, half_width), vector3(s + ONE, s, s - ONE))
 
 
 @wp.func
@@ -103,23 +110,34 @@ def gimp_slope(distance: scalar, half_width: scalar) -> scalar:
 
 
 @wp.func
-def gimp_affine(distance: scalar, half_width: scalar, fraction: scalar) -> scalar:
+def gimp_weights(fraction: scalar, half_width: scalar) -> vector3:
+    """Uniform GIMP at the three nodes."""
+    s = from_nearest_node(fraction)
+    return vector3(gimp_weight(s + ONE, half_width), gimp_weight(s, half_width), gimp_weight(s - ONE, half_width))
+
+
+@wp.func
+def gimp_slopes(fraction: scalar, half_width: scalar) -> vector3:
+    """Its derivatives."""
+    s = from_nearest_node(fraction)
+    return vector3(gimp_slope(s + ONE, half_width), gimp_slope(s, half_width), gimp_slope(s - ONE, half_width))
+
+
+@wp.func
+def gimp_affine(fraction: scalar, half_width: scalar) -> vector3:
     """-w s / sum(w s^2) over the three nodes of the stencil."""
-    first = fraction - scalar(offset_nearest_node(fraction))
-    second = first - ONE
-    third = first - TWO
-    moment = gimp_weight(first, half_width) * first * first
-    moment += gimp_weight(second, half_width) * second * second
-    moment += gimp_weight(third, half_width) * third * third
-    return -gimp_weight(distance, half_width) * distance / moment
+    s = from_nearest_node(fraction)
+    distances = vector3(s + ONE, s, s - ONE)
+    weighted = wp.cw_mul(gimp_weights(fraction, half_width), distances)
+    return -weighted / wp.dot(weighted, distances)
 
 
 LINEAR = Shape(
-    "linear", 2, offset_lower_node, linear_weight, linear_slope, linear_affine, 0.0
+    "linear", 2, offset_lower_node, linear_weights, linear_slopes, linear_affine, 0.0
 )  # its forces jump from cell to cell: not sharpened
 GIMP = Shape(
-    "gimp", 3, offset_nearest_node, gimp_weight, gimp_slope, gimp_affine, 3.0 / 16.0
+    "gimp", 3, offset_nearest_node, gimp_weights, gimp_slopes, gimp_affine, 3.0 / 16.0
 )  # 1/6 + l^2/3, 2 particles an axis
-BSPLINE = Shape("bspline", 3, offset_nearest_node, bspline_weight, bspline_slope, bspline_affine, 1.0 / 4.0)
+BSPLINE = Shape("bspline", 3, offset_nearest_node, bspline_weights, bspline_slopes, bspline_affine, 1.0 / 4.0)
 
 SHAPES = (LINEAR, GIMP, BSPLINE)

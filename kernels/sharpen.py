@@ -19,10 +19,10 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
+from warp_mpm.kernels.node_pass import Phase, node_kernel
 from warp_mpm.kernels.precision import ONE, TWO, ZERO, scalar, vector3, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index
-from warp_mpm.kernels.vectors import multiply_add8
+from warp_mpm.kernels.vectors import multiply_add8, second_three
 from warp_mpm.kernels.walls import (
     WALL_OPEN,
     Boundary,
@@ -65,23 +65,8 @@ def node_values(grid: Grid, n: int) -> vector8:
 
 @wp.func
 def step_velocities(grid: Grid, n: int) -> vector8:
-    """Mass of a node and its velocities that move the particles and do the work.
-
-    The mass is the node's: where there is none now, `kick` may be of an earlier step.
-    """
-    values = grid.kick[n]
-    values[3] = grid.node[n][3]
-    return values
-
-
-@wp.func
-def away_from_faces(cells: wp.vec3i, index: wp.vec3i) -> bool:
-    """Whether neither a node nor any neighbour lies on a face of the domain, or beyond."""
-    away = True
-    for axis in range(3):
-        if index[axis] < 2 or index[axis] > cells[axis] - 2:
-            away = False
-    return away
+    """Mass of a node and its velocities that move the particles and do the work; nothing where no particle is."""
+    return grid.kick[n]
 
 
 @wp.func
@@ -91,32 +76,36 @@ def pull(total: vector8, values: vector8, other: vector8) -> vector8:
 
 
 @functools.cache
-def excess_function(values_of: wp.Function) -> wp.Function:
-    """Device function: strength times sum of min(M_i, M_j) (x_i - x_j) over a node's neighbours, x from `values_of`."""
+def excess_functions(values_of: wp.Function) -> tuple[wp.Function, wp.Function]:
+    """Device functions: sum of min(M_i, M_j) (x_i - x_j) over a node's neighbours, x from `values_of`.
+
+    The first takes any node's index (i, j, k), the second the flat one of a node that has no face near.
+    """
 
     @wp.func
-    def excess(grid: Grid, boundary: Boundary, index: wp.vec3i, strength: scalar) -> vector8:
-        n = node_index(grid, index[0], index[1], index[2])
-        values = values_of(grid, n)
+    def excess(grid: Grid, boundary: Boundary, index: wp.vec3i) -> vector8:
+        values = values_of(grid, node_index(grid, index[0], index[1], index[2]))
         total = vector8()
-        if away_from_faces(grid.cells, index):  # nearly everywhere
-            total = pull(total, values, values_of(grid, n - grid.stride_x))
-            total = pull(total, values, values_of(grid, n + grid.stride_x))
-            total = pull(total, values, values_of(grid, n - grid.stride_y))
-            total = pull(total, values, values_of(grid, n + grid.stride_y))
-            total = pull(total, values, values_of(grid, n - 1))
-            total = pull(total, values, values_of(grid, n + 1))
-        else:
-            for axis in range(3):
-                mass = mass_along(grid, boundary, index, axis)
-                for side in range(-1, 2, 2):
-                    other = neighbour(grid, boundary, index, axis, side)
-                    link = wp.min(mass, mass_along(grid, boundary, other, axis))
-                    difference = values - values_of(grid, node_index(grid, other[0], other[1], other[2]))
-                    total = multiply_add8(total, link, difference)
-        return strength * total
+        for axis in range(3):
+            mass = mass_along(grid, boundary, index, axis)
+            for side in range(-1, 2, 2):
+                other = neighbour(grid, boundary, index, axis, side)
+                link = wp.min(mass, mass_along(grid, boundary, other, axis))
+                difference = values - values_of(grid, node_index(grid, other[0], other[1], other[2]))
+                total = multiply_add8(total, link, difference)
+        return total
 
-    return excess
+    @wp.func
+    def excess_inside(grid: Grid, n: int) -> vector8:
+        values = values_of(grid, n)
+        total = pull(vector8(), values, values_of(grid, n - grid.stride_x))
+        total = pull(total, values, values_of(grid, n + grid.stride_x))
+        total = pull(total, values, values_of(grid, n - grid.stride_y))
+        total = pull(total, values, values_of(grid, n + grid.stride_y))
+        total = pull(total, values, values_of(grid, n - 1))
+        return pull(total, values, values_of(grid, n + 1))
+
+    return excess, excess_inside
 
 
 @wp.func
@@ -128,27 +117,19 @@ def twice(signs: vector3) -> vector8:
 @functools.cache
 def sharpen_acceleration_kernel() -> wp.Kernel:
     """Accelerations -> sharpened ones, in `kick`; what walls do to the change is tallied in `reactions` [N]."""
-    excess_of = excess_function(node_values)
+    excess, excess_inside = excess_functions(node_values)
 
     @wp.func
-    def sharpen_node(
-        grid: Grid,
-        boundary: Boundary,
-        strength: scalar,
-        reactions: wp.array(dtype=wp.float64),
-        slot: int,
-        index: wp.vec3i,
-    ):
+    def visit(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, index: wp.vec3i):
         node = grid.node[node_index(grid, index[0], index[1], index[2])]
         value = vector3(node[4], node[5], node[6])
         force = vector3()
         added = vector3()
         free = free_components(boundary, grid.cells, index)
-        if node[3] == ZERO:
+        if node[3] == ZERO or not is_owner(boundary, grid.cells, index):
             return
         if node[3] > grid.light_mass:
-            excess = excess_of(grid, boundary, index, strength)
-            force = vector3(excess[4], excess[5], excess[6])
+            force = phase.strength * second_three(excess(grid, boundary, index))
             added = wp.cw_mul(free, force) / node[3]
         value = value + added
         owned = ghost_sides(boundary, grid.cells, index)
@@ -161,46 +142,35 @@ def sharpen_acceleration_kernel() -> wp.Kernel:
                     if near_wall:
                         given = wp.where(i + j + k == 0, force, vector3())
                         returned = grid.node[m][3] * added
-                        tally_reaction(boundary, grid, index, sides, given, vector3(), returned, reactions, slot)
+                        tally_reaction(boundary, grid, index, sides, given, vector3(), returned, phase.reactions, slot)
                     v = wp.cw_mul(image_signs(boundary, sides), value)
                     grid.kick[m] = vector8(ZERO, ZERO, ZERO, ZERO, v[0], v[1], v[2], ZERO)
 
-    @wp.kernel(enable_backward=False, module="unique")
-    def sharpen_acceleration(
-        grid: Grid,
-        boundary: Boundary,
-        clock: wp.array(dtype=Clock),
-        strength: scalar,
-        reactions: wp.array(dtype=wp.float64),
-        slot: int,
-        begin: int,
-    ):
-        thread = wp.tid()
-        block = begin + thread // grid.workers
-        if is_active(grid, block, clock[0].step - 1):
-            for n in range(thread % grid.workers, NODES, grid.workers):
-                index = node_of_block(grid, block, n)
-                if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
-                    sharpen_node(grid, boundary, strength, reactions, slot, index)
+    @wp.func
+    def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+        node = grid.node[n]
+        if node[3] > grid.light_mass:
+            node = multiply_add8(node, phase.strength / node[3], excess_inside(grid, n))
+        grid.kick[n] = node
 
-    return sharpen_acceleration
+    return node_kernel(visit, visit_inside, 1)
 
 
 @functools.cache
 def sharpen_velocity_kernel() -> wp.Kernel:
     """Velocities that move the particles and do the work, in `kick` -> sharpened ones, in the nodes."""
-    excess_of = excess_function(step_velocities)
+    excess, excess_inside = excess_functions(step_velocities)
 
     @wp.func
-    def sharpen_node(grid: Grid, boundary: Boundary, strength: scalar, index: wp.vec3i):
+    def visit(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, index: wp.vec3i):
         n = node_index(grid, index[0], index[1], index[2])
         mass = grid.node[n][3]
-        if mass == ZERO:
+        if mass == ZERO or not is_owner(boundary, grid.cells, index):
             return
         values = grid.kick[n]
         if mass > grid.light_mass:
             free = twice(free_components(boundary, grid.cells, index))
-            values += wp.cw_mul(free, excess_of(grid, boundary, index, strength)) / mass
+            values += wp.cw_mul(free, excess(grid, boundary, index)) * (phase.strength / mass)
         owned = ghost_sides(boundary, grid.cells, index)
         for i in range(image_count(owned[0])):
             for j in range(image_count(owned[1])):
@@ -211,14 +181,14 @@ def sharpen_velocity_kernel() -> wp.Kernel:
                     v = wp.cw_mul(twice(image_signs(boundary, sides)), values)
                     grid.node[m] = vector8(v[0], v[1], v[2], x[3], v[4], v[5], v[6], x[7])
 
-    @wp.kernel(enable_backward=False, module="unique")
-    def sharpen_velocity(grid: Grid, boundary: Boundary, clock: wp.array(dtype=Clock), strength: scalar, begin: int):
-        thread = wp.tid()
-        block = begin + thread // grid.workers
-        if is_active(grid, block, clock[0].step - 1):
-            for n in range(thread % grid.workers, NODES, grid.workers):
-                index = node_of_block(grid, block, n)
-                if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
-                    sharpen_node(grid, boundary, strength, index)
+    @wp.func
+    def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+        values = grid.kick[n]
+        if values[3] > grid.light_mass:
+            excess_here = excess_inside(grid, n)
+            excess_here[3] = ZERO  # mass and filling stay: others read them
+            excess_here[7] = ZERO
+            values = multiply_add8(values, phase.strength / values[3], excess_here)
+        grid.node[n] = values
 
-    return sharpen_velocity
+    return node_kernel(visit, visit_inside, 1)

@@ -13,7 +13,13 @@ from warp_mpm.kernels.content import lowest_cell, scatter_content
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
-from warp_mpm.kernels.vectors import multiply_add8, scatter_add4, scatter_add8
+from warp_mpm.kernels.stencil import (
+    gather_function,
+    scatter_function,
+    scatter_gradient_function,
+    stencil_type,
+)
+from warp_mpm.kernels.vectors import first_three, second_three
 
 
 @functools.cache
@@ -31,48 +37,28 @@ def lowest_node_function(shape: Shape) -> wp.Function:
 
 
 @functools.cache
-def stencil_functions(shape: Shape) -> tuple[wp.Function, wp.Function, wp.Function, wp.Function]:
-    """Device functions of a shape's stencil: `first_node`, and per axis `weights`, `slopes`, `affine_weights`.
-
-    first_node(grid, cell, fraction) is the flat index of the stencil's lowest node; the others take
-    (fraction, half_width) and return a vector of `shape.width` values.
-    """
-    width = shape.width
-    weights_type = wp.types.vector(width, scalar)
-    offset, weight, slope, affine = shape.offset, shape.weight, shape.slope, shape.affine
-
+def stencil_function(shape: Shape) -> wp.Function:
+    """Device function (grid, cell, fraction, half_width) -> the particle's stencil."""
     lowest_node = lowest_node_function(shape)
+    weights, slopes = shape.weights, shape.slopes
+    record = stencil_type(shape.width)
 
     @wp.func
-    def first_node(grid: Grid, cell: wp.vec3s, fraction: vector3) -> int:
+    def stencil_of(grid: Grid, cell: wp.vec3s, fraction: vector3, half_width: scalar) -> record:
+        stencil = record()
         lowest = lowest_node(cell, fraction)
-        return node_index(grid, lowest[0], lowest[1], lowest[2])
+        stencil.first = node_index(grid, lowest[0], lowest[1], lowest[2])
+        stencil.stride_x = grid.stride_x
+        stencil.stride_y = grid.stride_y
+        stencil.wx = weights(fraction[0], half_width)
+        stencil.wy = weights(fraction[1], half_width)
+        stencil.wz = weights(fraction[2], half_width)
+        stencil.sx = slopes(fraction[0], half_width) * grid.inverse_spacing[0]
+        stencil.sy = slopes(fraction[1], half_width) * grid.inverse_spacing[1]
+        stencil.sz = slopes(fraction[2], half_width) * grid.inverse_spacing[2]
+        return stencil
 
-    @wp.func
-    def weights(fraction: scalar, half_width: scalar) -> weights_type:
-        result = weights_type()
-        distance = fraction - scalar(offset(fraction))
-        for n in range(width):
-            result[n] = weight(distance - scalar(n), half_width)
-        return result
-
-    @wp.func
-    def slopes(fraction: scalar, half_width: scalar) -> weights_type:
-        result = weights_type()
-        distance = fraction - scalar(offset(fraction))
-        for n in range(width):
-            result[n] = slope(distance - scalar(n), half_width)
-        return result
-
-    @wp.func
-    def affine_weights(fraction: scalar, half_width: scalar) -> weights_type:
-        result = weights_type()
-        distance = fraction - scalar(offset(fraction))
-        for n in range(width):
-            result[n] = affine(distance - scalar(n), half_width, fraction)
-        return result
-
-    return first_node, weights, slopes, affine_weights
+    return stencil_of
 
 
 @functools.cache
@@ -93,6 +79,38 @@ def node_offset_function(shape: Shape) -> wp.Function:
 
 
 @functools.cache
+def affine_gradient_function(shape: Shape) -> wp.Function:
+    """Device function: velocity gradient of APIC, C = sum (v + dt a)_i (x_i - x_p)^T w / D [1/s]."""
+    width = shape.width
+    affine_weights = shape.affine
+    record = stencil_type(width)
+
+    @wp.func
+    def affine_gradient(grid: Grid, stencil: record, fraction: vector3, half_width: scalar, dt: scalar) -> matrix3:
+        ax = affine_weights(fraction[0], half_width) * grid.inverse_spacing[0]
+        ay = affine_weights(fraction[1], half_width) * grid.inverse_spacing[1]
+        az = affine_weights(fraction[2], half_width) * grid.inverse_spacing[2]
+        gradient = matrix3()
+        for i in range(width):
+            for j in range(width):
+                for k in range(width):
+                    node = grid.node[stencil.first + i * grid.stride_x + j * grid.stride_y + k]
+                    bx = ax[i] * stencil.wy[j] * stencil.wz[k]
+                    by = stencil.wx[i] * ay[j] * stencil.wz[k]
+                    bz = stencil.wx[i] * stencil.wy[j] * az[k]
+                    gradient += wp.outer(first_three(node) + dt * second_three(node), vector3(bx, by, bz))
+        return gradient
+
+    return affine_gradient
+
+
+@wp.func
+def force_on(force: vector3) -> vector8:
+    """A force in the lanes of a node."""
+    return vector8(ZERO, ZERO, ZERO, ZERO, force[0], force[1], force[2], ZERO)
+
+
+@functools.cache
 def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, content: bool) -> wp.Kernel:
     """Particles -> nodes: momentum, mass and volume (`momentum`); internal force and field pressure (`force`).
 
@@ -101,8 +119,10 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, cont
     cells sum L V p, sum L V (`content`).
     """
     width = shape.width
-    first_node, weights, slopes, _ = stencil_functions(shape)
+    stencil_of = stencil_function(shape)
     node_offset = node_offset_function(shape)
+    scatter_gradient = scatter_gradient_function(width, 8)
+    scatter_pressure = scatter_function(width, 1)
 
     @wp.kernel(enable_backward=False, module="unique")
     def scatter(
@@ -114,49 +134,48 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, cont
         begin: int,
     ):
         p = begin + wp.tid()
-        mass = particles.mass[p]
+        motion = particles.motion[p]
+        mass = motion.mass
         if mass == ZERO:
             return
-        fraction = particles.fraction[p]
-        first = first_node(grid, particles.cell[p], fraction)
-        wx = weights(fraction[0], half_width)
-        wy = weights(fraction[1], half_width)
-        wz = weights(fraction[2], half_width)
-        stamp_blocks(grid, lowest_cell(particles.cell[p], fraction), clock[0].step)
-        volume = mass / particles.density[p]
-        carried = mass * particles.velocity[p]
-        pressure_volume = particles.pressure[p] * volume
-        pull = pressure_volume + (particles.viscous_pressure[p] - ambient_pressure) * volume
-        thrust = wp.sqrt(volume) * particles.viscous_thrust[p]
-        sx = slopes(fraction[0], half_width) / grid.spacing[0]
-        sy = slopes(fraction[1], half_width) / grid.spacing[1]
-        sz = slopes(fraction[2], half_width) / grid.spacing[2]
-        for i in range(width):
-            for j in range(width):
-                row = first + i * grid.stride_x + j * grid.stride_y
-                wij = wx[i] * wy[j]
-                along = vector8()  # what a row's nodes get by their weights along z
-                across = vector8()  # and by their slopes
-                if wp.static(momentum):
-                    along += wij * vector8(carried[0], carried[1], carried[2], mass, ZERO, ZERO, ZERO, volume)
-                if wp.static(force):
-                    gx = sx[i] * wy[j]
-                    gy = wx[i] * sy[j]
-                    f = vector3(pull * gx, pull * gy, ZERO) + (thrust[0] * gx + thrust[1] * gy) * thrust
-                    along += vector8(ZERO, ZERO, ZERO, ZERO, f[0], f[1], f[2], ZERO)
-                    f = vector3(ZERO, ZERO, pull * wij) + (thrust[2] * wij) * thrust
-                    across = vector8(ZERO, ZERO, ZERO, ZERO, f[0], f[1], f[2], ZERO)
-                for k in range(width):
-                    value = multiply_add8(vector8(), wz[k], along)
-                    if wp.static(affine and momentum):
-                        extra = wij * wz[k] * mass * (particles.affine[p] * node_offset(grid, fraction, i, j, k))
-                        value += vector8(extra[0], extra[1], extra[2], ZERO, ZERO, ZERO, ZERO, ZERO)
-                    if wp.static(force):
-                        value = multiply_add8(value, sz[k], across)
-                        wp.atomic_add(grid.pressure, row + k, wij * wz[k] * pressure_volume)
-                    scatter_add8(grid.node, row + k, ONE, value)
+        matter = particles.matter[p]
+        position = particles.position[p]
+        cell = position.cell
+        fraction = position.fraction
+        stencil = stencil_of(grid, cell, fraction, half_width)
+        stamp_blocks(grid, lowest_cell(cell, fraction), clock[0].step)
+        volume = mass / matter.density
+        pressure_volume = matter.pressure * volume
+        scattered = vector8()
+        force_x = vector3()  # V sigma, column by column
+        force_y = vector3()
+        force_z = vector3()
+        if wp.static(momentum):
+            carried = mass * motion.velocity
+            scattered = vector8(carried[0], carried[1], carried[2], mass, ZERO, ZERO, ZERO, volume)
+        if wp.static(force):
+            push = pressure_volume + (matter.viscous_pressure - ambient_pressure) * volume
+            thrust = matter.viscous_thrust
+            directed = volume * thrust
+            force_x = directed[0] * thrust + vector3(push, ZERO, ZERO)
+            force_y = directed[1] * thrust + vector3(ZERO, push, ZERO)
+            force_z = directed[2] * thrust + vector3(ZERO, ZERO, push)
+            scatter_pressure(stencil, grid.pressure, pressure_volume)
+        scatter_gradient(stencil, grid.node, scattered, force_on(force_x), force_on(force_y), force_on(force_z))
+        if wp.static(affine and momentum):
+            for i in range(width):
+                for j in range(width):
+                    for k in range(width):
+                        weight = mass * stencil.wx[i] * stencil.wy[j] * stencil.wz[k]
+                        extra = weight * (particles.affine[p] * node_offset(grid, fraction, i, j, k))
+                        node = stencil.first + i * grid.stride_x + j * grid.stride_y + k
+                        wp.atomic_add(
+                            grid.node,
+                            node,
+                            vector8(extra[0], extra[1], extra[2], ZERO, ZERO, ZERO, ZERO, ZERO),
+                        )
         if wp.static(content):
-            scatter_content(grid, particles.cell[p], fraction, particles.pressure[p], volume)
+            scatter_content(grid, cell, fraction, matter.pressure, volume)
 
     return scatter
 
@@ -170,8 +189,11 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sha
     `sharpened`, which does not go with the other two, a comes from `kick`.
     """
     width = shape.width
-    first_node, weights, _, affine_weights = stencil_functions(shape)
+    stencil_of = stencil_function(shape)
+    affine_gradient = affine_gradient_function(shape)
     node_offset = node_offset_function(shape)
+    gather = gather_function(width, 8)
+    scatter = scatter_function(width, 4)
 
     @wp.kernel(enable_backward=False, module="unique")
     def advance(
@@ -183,54 +205,40 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sha
         begin: int,
     ):
         p = begin + wp.tid()
-        mass = particles.mass[p]
+        motion = particles.motion[p]
+        mass = motion.mass
         if mass == ZERO:
             return
         dt = clock[0].dt
-        fraction = particles.fraction[p]
-        first = first_node(grid, particles.cell[p], fraction)
-        wx = weights(fraction[0], half_width)
-        wy = weights(fraction[1], half_width)
-        wz = weights(fraction[2], half_width)
+        position = particles.position[p]
+        fraction = position.fraction
+        stencil = stencil_of(grid, position.cell, fraction, half_width)
         sums = vector8()
-        gradient = matrix3()
-        for i in range(width):
-            for j in range(width):
-                row = first + i * grid.stride_x + j * grid.stride_y
-                row_sums = vector8()
-                for k in range(width):
-                    if wp.static(sharpened):
-                        row_sums = multiply_add8(row_sums, wz[k], grid.kick[row + k])
-                    else:
-                        row_sums = multiply_add8(row_sums, wz[k], grid.node[row + k])
-                    if wp.static(affine):
-                        node = grid.node[row + k]
-                        bx = affine_weights(fraction[0], half_width)[i] * wy[j] * wz[k] / grid.spacing[0]
-                        by = wx[i] * affine_weights(fraction[1], half_width)[j] * wz[k] / grid.spacing[1]
-                        bz = wx[i] * wy[j] * affine_weights(fraction[2], half_width)[k] / grid.spacing[2]
-                        v = vector3(node[0], node[1], node[2]) + dt * vector3(node[4], node[5], node[6])
-                        gradient += wp.outer(v, vector3(bx, by, bz))
-                sums = multiply_add8(sums, wx[i] * wy[j], row_sums)
-        increment = dt * vector3(sums[4], sums[5], sums[6])
-        velocity = particles.velocity[p] + increment
+        if wp.static(sharpened):
+            sums += gather(stencil, grid.kick)
+        else:
+            sums += gather(stencil, grid.node)
+        increment = dt * second_three(sums)
+        velocity = motion.velocity + increment
         if wp.static(blend):
-            grid_velocity = vector3(sums[0], sums[1], sums[2]) + increment
-            velocity = (ONE - pic_share) * velocity + pic_share * grid_velocity
+            velocity = (ONE - pic_share) * velocity + pic_share * (first_three(sums) + increment)
+        particles.motion[p].velocity = velocity
+        gradient = matrix3()
         if wp.static(affine):
+            gradient = affine_gradient(grid, stencil, fraction, half_width, dt)
             particles.affine[p] = gradient
-        particles.velocity[p] = velocity
-        if wp.static(reproject):
+        if wp.static(reproject and affine):
             for i in range(width):
                 for j in range(width):
-                    row = first + i * grid.stride_x + j * grid.stride_y
-                    wij = wx[i] * wy[j] * mass
                     for k in range(width):
-                        carried = velocity
-                        if wp.static(affine):
-                            carried += gradient * node_offset(grid, fraction, i, j, k)
-                        kinetic = HALF * wp.dot(carried, carried)
-                        value = vector4(carried[0], carried[1], carried[2], kinetic)
-                        scatter_add4(grid.reprojected, row + k, wij * wz[k], value)
+                        carried = velocity + gradient * node_offset(grid, fraction, i, j, k)
+                        weight = mass * stencil.wx[i] * stencil.wy[j] * stencil.wz[k]
+                        value = vector4(carried[0], carried[1], carried[2], HALF * wp.dot(carried, carried))
+                        node = stencil.first + i * grid.stride_x + j * grid.stride_y + k
+                        wp.atomic_add(grid.reprojected, node, weight * value)
+        if wp.static(reproject and not affine):
+            kinetic = HALF * wp.dot(velocity, velocity)
+            scatter(stencil, grid.reprojected, mass * vector4(velocity[0], velocity[1], velocity[2], kinetic))
 
     return advance
 
@@ -238,24 +246,12 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sha
 @functools.cache
 def displacement_function(shape: Shape) -> wp.Function:
     """Device function: how far a particle moves in a step, dt sum w (v + dt a)_i, in cells (paper eq. 15)."""
-    width = shape.width
-    first_node, weights, _, _ = stencil_functions(shape)
+    stencil_of = stencil_function(shape)
+    gather = gather_function(shape.width, 8)
 
     @wp.func
     def displacement(grid: Grid, cell: wp.vec3s, fraction: vector3, half_width: scalar, dt: scalar) -> vector3:
-        first = first_node(grid, cell, fraction)
-        wx = weights(fraction[0], half_width)
-        wy = weights(fraction[1], half_width)
-        wz = weights(fraction[2], half_width)
-        velocity = vector3()
-        for i in range(width):
-            for j in range(width):
-                row = first + i * grid.stride_x + j * grid.stride_y
-                wij = wx[i] * wy[j]
-                for k in range(width):
-                    node = grid.node[row + k]
-                    a = vector3(node[4], node[5], node[6])
-                    velocity += wij * wz[k] * (vector3(node[0], node[1], node[2]) + dt * a)
-        return wp.cw_div(dt * velocity, grid.spacing)
+        sums = gather(stencil_of(grid, cell, fraction, half_width), grid.node)
+        return dt * wp.cw_mul(first_three(sums) + dt * second_three(sums), grid.inverse_spacing)
 
     return displacement

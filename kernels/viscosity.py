@@ -13,7 +13,7 @@ axis it is the scalar viscosity, whatever |b| is.
 
 import warp as wp
 
-from warp_mpm.kernels.precision import ONE, ZERO, matrix3, scalar, vector3
+from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
 
 DIRECTED = wp.constant(scalar(0.2))  # of the sound speed: velocity jump over a cell from which on it is directed
 TINY = wp.constant(scalar(1.0e-30))  # keeps rest from being divided by
@@ -26,27 +26,34 @@ class Viscosity:
     quadratic: scalar  # c_Q
     linear: scalar  # c_L
     length: scalar  # l = (hx hy hz)^(1/3) [m]
+    inverse_length: scalar  # [1/m]
 
 
 @wp.func
-def viscous_axis(viscosity: Viscosity, sound_speed: scalar, acceleration: vector3, divergence: scalar) -> vector3:
-    """B: along the acceleration, which may be in any unit, and as long as the compression is strong."""
-    axis = vector3()
+def unit_vector(value: vector3) -> vector3:
+    """Value / |value|, or 0 where that is too small to have a direction."""
+    size = wp.dot(value, value)
+    result = vector3()
+    if size > TINY:
+        result = (ONE / wp.sqrt(size)) * value
+    return result
+
+
+@wp.func
+def directedness(viscosity: Viscosity, sound_speed: scalar, divergence: scalar) -> scalar:
+    """|b|: 1 where the compression is strong, 0 where it is weak."""
     closing = viscosity.length * divergence
     threshold = DIRECTED * sound_speed
     closing = closing * closing
     threshold = threshold * threshold
     squared = closing * closing + threshold * threshold
-    size = wp.dot(acceleration, acceleration)
-    if squared > TINY and size > TINY:
-        axis = (closing / (wp.sqrt(squared) * wp.sqrt(size))) * acceleration
-    return axis
+    return wp.where(squared > TINY, closing / wp.sqrt(squared), ZERO)
 
 
 @wp.func
-def closing_rate(axis: vector3, gradient: matrix3) -> scalar:
-    """d = b . (grad v) . b + (1 - |b|^2) div v [1/s]."""
-    return wp.dot(axis, gradient * axis) + (ONE - wp.dot(axis, axis)) * wp.trace(gradient)
+def closing_rate(share: scalar, along: scalar, divergence: scalar) -> scalar:
+    """d = b . (grad v) . b + (1 - |b|^2) div v [1/s], with |b|^2 the share and `along` the strain rate along b."""
+    return share * along + (ONE - share) * divergence
 
 
 @wp.func
@@ -61,5 +68,5 @@ def viscous_pressure(viscosity: Viscosity, density: scalar, sound_speed: scalar,
 def viscous_rate(viscosity: Viscosity, sound_speed: scalar, rate: scalar) -> scalar:
     """Viscosity over length squared, nu / l^2 [1/s]: one explicit step may not exceed a Courant number over this."""
     compression = wp.max(-rate, ZERO)
-    active = wp.where(compression > ZERO, viscosity.linear * sound_speed / viscosity.length, ZERO)
+    active = wp.where(compression > ZERO, viscosity.linear * sound_speed * viscosity.inverse_length, ZERO)
     return viscosity.quadratic * compression + active

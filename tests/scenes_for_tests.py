@@ -153,7 +153,7 @@ def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
     inputs = [state.particles, state.grid, state.clock, model.charges[0].half_width, model.scene.ambient_pressure, 0]
     wp.launch(kernel, state.count, inputs=inputs, device=state.device)
     sums = nodes(solver).astype(np.float64)
-    return sums, state.grid.pressure.numpy().reshape(sums.shape[:3]).astype(np.float64)
+    return sums, state.grid.pressure.numpy()[: sums[..., 0].size].reshape(sums.shape[:3]).astype(np.float64)
 
 
 def tent_sums(domain: Domain, position: np.ndarray, carried: np.ndarray) -> np.ndarray:

@@ -242,7 +242,7 @@ def test_damping_only_heats(device):
 
     def shake(state):
         noise = np.random.default_rng(7).normal(0.0, 50.0, (state.count, 3))
-        state.particles.velocity.assign(noise.astype(np.float32))
+        state.assign("velocity", noise.astype(np.float32))
 
     scene = block(BLOCK, material=inert_gas(1000.0, 1e6))
     damped = start(scene, device, prepare=shake)

@@ -75,12 +75,11 @@ def stir(state):
     n = state.count
     fraction = random.random((n, 3)).astype(np.float32)
     special = random.choice([0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(0.0)), LAST_FRACTION], (n, 3))
-    particles = state.particles
-    particles.fraction.assign(np.where(random.random((n, 3)) < 0.1, special, fraction).astype(np.float32))
-    particles.cell.assign(random.integers(0, state.model.scene.domain.cells, (n, 3)).astype(np.int16))
-    particles.mass.assign((particles.mass.numpy() * random.uniform(0.5, 2.0, n)).astype(np.float32))
-    particles.density.assign(random.uniform(500.0, 2000.0, n).astype(np.float32))
-    particles.energy.assign(random.uniform(1e5, 2e6, n).astype(np.float32))
+    state.assign("fraction", np.where(random.random((n, 3)) < 0.1, special, fraction).astype(np.float32))
+    state.assign("cell", random.integers(0, state.model.scene.domain.cells, (n, 3)).astype(np.int16))
+    state.assign("mass", (state.values("mass") * random.uniform(0.5, 2.0, n)).astype(np.float32))
+    state.assign("density", random.uniform(500.0, 2000.0, n).astype(np.float32))
+    state.assign("energy", random.uniform(1e5, 2e6, n).astype(np.float32))
 
 
 def carried(values):
@@ -139,7 +138,7 @@ def gather_kernel():
     @wp.kernel(enable_backward=False, module="unique")
     def evaluate(particles: Particles, grid: Grid, contents: wp.array(dtype=vector2)):
         p = wp.tid()
-        contents[p] = content.gather_content(grid, particles.cell[p], particles.fraction[p])
+        contents[p] = content.gather_content(grid, particles.position[p].cell, particles.position[p].fraction)
 
     return evaluate
 
@@ -254,9 +253,9 @@ def test_evenly_filled_cells_are_at_rest(device):
 
     def fill_evenly(state):
         stir(state)
-        fraction = state.particles.fraction.numpy().copy()
+        fraction = state.values("fraction").copy()
         fraction[:, 1:] = 0.5
-        state.particles.fraction.assign(fraction)
+        state.assign("fraction", fraction)
         place = particle_values(state)["position"][state.particles.index.numpy()]
         unit = np.ones(1)
         shares = [mirrored_cells(tent_sums(scene.domain, x[None], unit), scene.walls)[1:-2, 1, 1] for x in place]
@@ -265,9 +264,9 @@ def test_evenly_filled_cells_are_at_rest(device):
         volume += np.linalg.lstsq(np.transpose(shares), missing, rcond=None)[0]
         assert volume.min() > 0.1 * full
         assert volume.max() > 1.5 * volume.min()
-        state.particles.density.fill_(1000.0)
-        state.particles.mass.assign((1000.0 * volume).astype(np.float32))
-        state.particles.energy.fill_(1e6)
+        state.assign("density", 1000.0)
+        state.assign("mass", (1000.0 * volume).astype(np.float32))
+        state.assign("energy", 1e6)
 
     solver = start(scene, device, prepare=fill_evenly)
     held = cell_content(solver)[:-1, :-1, :-1]

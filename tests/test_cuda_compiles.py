@@ -3,7 +3,7 @@
 import pytest
 import warp as wp
 
-from warp_mpm.kernels import grid, material, reduce, shape, sharpen, transfer
+from warp_mpm.kernels import grid, material, reduce, shape, sharpen, strain, transfer
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
@@ -14,8 +14,9 @@ KERNELS = {
     "scatter": lambda: transfer.scatter_kernel(shape.BSPLINE, True, True, False, True),
     "advance": lambda: transfer.advance_kernel(shape.BSPLINE, False, False, True, True),
     "update": lambda: material.update_kernel(
-        shape.BSPLINE, material.Strain.REPROJECTED, True, True, IdealGas, ProgrammedBurn
+        shape.BSPLINE, strain.Strain.REPROJECTED, True, True, IdealGas, ProgrammedBurn
     ),
+    "clear": grid.clear_kernel,
     "solve": lambda: grid.solve_kernel(True, True, True),
     "solve_reprojected": lambda: grid.solve_reprojected_kernel(True),
     "sharpen_acceleration": sharpen.sharpen_acceleration_kernel,

@@ -37,7 +37,7 @@ def test_free_fall(config, device):
     steps = 40
 
     def throw(state):
-        state.particles.velocity.assign(np.broadcast_to(THROWN.astype(np.float32), (state.count, 3)))
+        state.assign("velocity", np.broadcast_to(THROWN.astype(np.float32), (state.count, 3)))
 
     gas = inert_gas(density=1.0, energy=1e-9)
     scene = block((3, 3, 3), material=gas, walls=OPEN, margin_cells=13, gravity=tuple(GRAVITY))
@@ -82,7 +82,7 @@ def test_a_column_of_gas_stands(cells, transfer, device):
 
     def stand(state):
         x = particle_values(state)["position"][state.particles.index.numpy(), 0]
-        state.particles.energy.assign((pressure_at(x) / ((gamma - 1.0) * density)).astype(np.float32))
+        state.assign("energy", (pressure_at(x) / ((gamma - 1.0) * density)).astype(np.float32))
 
     gas = inert_gas(density, energy, gamma)
     scene = block((cells, 1, 1), material=gas, gravity=(-gravity, 0.0, 0.0))

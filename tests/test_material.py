@@ -197,6 +197,7 @@ def test_artificial_viscosity(device):
     """
     viscosity = Viscosity()
     viscosity.quadratic, viscosity.linear, viscosity.length = 1.5, 0.06, 3e-3
+    viscosity.inverse_length = 1.0 / 3e-3
     density, sound = 1300.0, 2200.0
     divergences = np.array([-1e5, -3e3, 0.0, 3e3, 1e5])
     rows = wp.zeros((len(divergences), 2), dtype=scalar, device=device)

@@ -126,9 +126,9 @@ def test_a_velocity_that_is_no_number_stops_the_run(device, monkeypatch):
     class Spoilt(State):
         def __init__(self, model):
             super().__init__(model)
-            velocity = self.particles.velocity.numpy().copy()
+            velocity = self.values("velocity").copy()
             velocity[100, 1] = np.nan
-            self.particles.velocity.assign(velocity)
+            self.assign("velocity", velocity)
 
     monkeypatch.setattr(simulation, "State", Spoilt)
     with pytest.raises(SimulationError, match="step 1 at"):
@@ -139,9 +139,9 @@ def test_a_fast_particle_shortens_the_step(device):
     """10 km/s at the start: the step is 0.3 h / (c + |v|) along its axis, and it moves 0.3 cells at most."""
 
     def hit(state):
-        velocity = state.particles.velocity.numpy().copy()
+        velocity = state.values("velocity").copy()
         velocity[:, 1] = 1e4
-        state.particles.velocity.assign(velocity)
+        state.assign("velocity", velocity)
 
     gas = inert_gas(1.0, 1e5)
     solver = start(block((4, 4, 4), material=gas, walls=OPEN, margin_cells=6), device, prepare=hit)

@@ -15,7 +15,6 @@ from scenes_for_tests import ROUND_OFF
 
 from warp_mpm.kernels.precision import scalar
 from warp_mpm.kernels.shape import SHAPES
-from warp_mpm.kernels.transfer import stencil_functions
 
 HALF_WIDTHS = [0.5 / per_axis for per_axis in (1, 2, 3, 4)]
 LAST_FRACTION = float(np.nextafter(np.float32(1.0), np.float32(0.0)))
@@ -30,7 +29,7 @@ pytestmark = [
 @functools.cache
 def stencil_kernel(shape):
     """Kernel that fills a row of weights, slopes, affine weights and the offset for each fraction."""
-    _, weights, slopes, affine_weights = stencil_functions(shape)
+    weights, slopes, affine_weights = shape.weights, shape.slopes, shape.affine
     width, offset = shape.width, shape.offset
 
     @wp.kernel(enable_backward=False, module="unique")

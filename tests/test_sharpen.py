@@ -14,6 +14,7 @@ import warp as wp
 from scenes_for_tests import CELL, OPEN, ROUND_OFF, STICK, advance, block, inert_gas, nodes, particle_values, start
 
 from warp_mpm.config import Save, ShapeFunction, Transfer
+from warp_mpm.kernels.node_pass import Phase
 from warp_mpm.kernels.shape import BSPLINE, SHAPES
 from warp_mpm.kernels.sharpen import sharpen_acceleration_kernel, sharpen_velocity_kernel
 from warp_mpm.kernels.walls import REACTIONS
@@ -39,6 +40,7 @@ grids = pytest.mark.parametrize(
     ("walls", "cells"),
     [
         pytest.param(OPEN, CELLS, id="free"),
+        pytest.param(Walls(), (10, 8, 9), id="with_an_inside"),
         pytest.param(Walls(), CELLS, id="slip"),
         pytest.param(STICK, CELLS, id="stick"),
         pytest.param(MIXED, CELLS, id="mixed"),
@@ -157,11 +159,13 @@ def by_kernel(solver, walls, mass, x, phase, ghost_mass=0.0):
     node[..., 3] = ghost_mass
     node[(*own_nodes(walls), 3)] = mass[..., 0]
     source, target = (node, state.grid.kick) if accelerations else (kick, state.grid.node)
+    kick[..., [3, 7]] = node[..., [3, 7]]
     source[..., lanes] = with_ghosts(walls, unfold(walls, x, odd_components(walls)))
     state.grid.node.assign(node.reshape(-1, 8))
     state.grid.kick.assign(kick.reshape(-1, 8))
-    tally = [state.reactions, 0] if accelerations else []
-    inputs = [state.grid, model.boundary, state.clock, STRENGTH, *tally, 0]
+    what = Phase()
+    what.strength, what.reactions = STRENGTH, state.reactions
+    inputs = [state.grid, model.boundary, state.clock, what, 0, 0]
     wp.launch(make_kernel(), state.blocks * state.grid.workers, inputs=inputs, device=state.device)
     kept = slice(None) if accelerations else [3, 7]
     np.testing.assert_array_equal(nodes(solver)[..., kept], node[..., kept])

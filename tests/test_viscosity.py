@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 from warp_mpm.kernels.precision import matrix3, scalar, vector3
-from warp_mpm.kernels.viscosity import Viscosity, closing_rate, viscous_axis
+from warp_mpm.kernels.viscosity import Viscosity, closing_rate, directedness, unit_vector
 
 ROUND_OFF = float(np.finfo(np.float32).eps)
 LENGTH, SOUND = 0.01, 1000.0  # [m], [m/s]
@@ -28,9 +28,11 @@ def axis_kernel():
         rates: wp.array(dtype=scalar),
     ):
         n = wp.tid()
-        axis = viscous_axis(viscosity, sound_speed, accelerations[n], wp.trace(gradients[n]))
+        divergence = wp.trace(gradients[n])
+        direction = unit_vector(accelerations[n])
+        axis = directedness(viscosity, sound_speed, divergence) * direction
         axes[n] = axis
-        rates[n] = closing_rate(axis, gradients[n])
+        rates[n] = closing_rate(wp.dot(axis, axis), wp.dot(direction, gradients[n] * direction), divergence)
 
     return evaluate
 

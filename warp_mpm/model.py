@@ -8,7 +8,7 @@ import warp as wp
 
 from warp_mpm.config import Order, ShapeFunction, SolverConfig, Transfer
 from warp_mpm.detonators import PlaneDetonator, PointDetonator
-from warp_mpm.kernels import material, shape, walls
+from warp_mpm.kernels import shape, strain, walls
 from warp_mpm.kernels.arrival import Ignition
 from warp_mpm.kernels.motion import Faces
 from warp_mpm.kernels.order import Slabs
@@ -17,8 +17,10 @@ from warp_mpm.materials import Material
 from warp_mpm.scene import Charge, Scene, Wall
 
 DEFAULT_BURN_WIDTH = 0.5  # [cells]; narrower gains nothing, the front is then as wide as the grid makes it
-SLAB_THICKNESS = 16  # cells; two slabs of one parity stay apart while particles drift by less than 7
-LARGEST_DRIFT = 6.0  # cells that a particle may move between two sortings
+LARGEST_DRIFT = 3.0  # cells that a particle may move between two sortings
+# Two slabs of one parity have a whole one between them: particles drift towards each other from both, and their
+# stencils reach two nodes up and one down, and one more where rows are written four at a time (`kernels/stencil.py`).
+THINNEST_SLAB = 10  # cells
 
 WALL_CODES = {Wall.OPEN: walls.WALL_OPEN, Wall.SLIP: walls.WALL_SLIP, Wall.STICK: walls.WALL_STICK}
 SHAPES = {
@@ -27,9 +29,9 @@ SHAPES = {
     ShapeFunction.BSPLINE: shape.BSPLINE,
 }
 STRAINS = {
-    Order.MUSL: material.Strain.REPROJECTED,
-    Order.USL: material.Strain.END,
-    Order.USF: material.Strain.START,
+    Order.MUSL: strain.Strain.REPROJECTED,
+    Order.USL: strain.Strain.END,
+    Order.USF: strain.Strain.START,
 }
 
 
@@ -68,7 +70,6 @@ class Model:
     faces: Faces
     viscosity: Viscosity
     slabs: Slabs
-    slab_count: int
 
     @property
     def spacing(self) -> np.ndarray:
@@ -96,6 +97,11 @@ class Model:
         return self.config.transfer is Transfer.APIC
 
     @property
+    def slab_count(self) -> int:
+        """Number of slabs that the particles are sorted into; a CPU's threads work on slabs."""
+        return int(self.slabs.count)
+
+    @property
     def burns(self) -> bool:
         """Whether any charge is an explosive."""
         return any(charge.material.burn is not None for charge in self.charges)
@@ -108,7 +114,9 @@ def build_model(scene: Scene, config: SolverConfig, device: wp.Device) -> Model:
     slabs = Slabs()
     slabs.axis = int(np.argmax(cells))
     longest = int(cells[slabs.axis])
-    slabs.thickness = longest if device.is_cuda else SLAB_THICKNESS
+    # An even number, so that as many slabs run first as second.
+    slabs.count = 1 if device.is_cuda else max(1, longest // THINNEST_SLAB // 2 * 2)
+    slabs.cells = longest
     slabs.charges = len(scene.charges)
     return Model(
         scene=scene,
@@ -121,7 +129,6 @@ def build_model(scene: Scene, config: SolverConfig, device: wp.Device) -> Model:
         faces=_faces(scene),
         viscosity=_viscosity(scene, config),
         slabs=slabs,
-        slab_count=-(-longest // slabs.thickness),
     )
 
 
@@ -167,4 +174,5 @@ def _viscosity(scene: Scene, config: SolverConfig) -> Viscosity:
     viscosity = Viscosity()
     viscosity.quadratic, viscosity.linear = config.viscosity
     viscosity.length = scene.domain.cell_volume ** (1 / 3)
+    viscosity.inverse_length = 1.0 / viscosity.length
     return viscosity

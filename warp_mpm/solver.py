@@ -17,6 +17,7 @@ from warp_mpm.kernels import grid as grid_kernels
 from warp_mpm.kernels import material, motion, reduce, sharpen, transfer
 from warp_mpm.kernels.blocks import NODES
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
+from warp_mpm.kernels.node_pass import Phase
 from warp_mpm.launch import Launcher, Task
 from warp_mpm.model import LARGEST_DRIFT, STRAINS, ChargeModel, Model
 from warp_mpm.state import State
@@ -38,30 +39,42 @@ class Solver:
 
     def step(self) -> None:
         """One step, of whatever length the state allows."""
-        self._start_step.launch()
-        if self.model.config.order is Order.USF:
-            self._scatter(self._scatter_momentum)
-            self._over_nodes(self._solve_momentum)
-            self._over_particles(self._update)
-            self._over_slabs(self._scatter_force)
-            self._over_nodes(self._solve_force)
-            self._collect_reactions.launch()
-            self._over_slabs(self._advance)
-            self._over_particles(self._move)
-        else:
-            if self.model.damped:
-                self._over_nodes(self._sharpen_acceleration)
-            self._collect_reactions.launch()
-            self._over_slabs(self._advance)
-            if self.model.config.order is Order.MUSL:
-                self._over_nodes(self._solve_reprojected)
-            if self.model.damped:
-                self._over_nodes(self._sharpen_velocity)
-            self._over_particles(self._update)
-            self._scatter(self._scatter_all)
-            self._over_nodes(self._solve_all)
-        self._end_step.launch()
+        for _, run in self.phases():
+            run()
         self.steps_since_sort += 1
+
+    def phases(self) -> Iterator[tuple[str, Callable[[], None]]]:
+        """The phases of a step, in order, by name."""
+        if self.model.config.order is Order.USF:
+            yield from self._phases_of_usf()
+            return
+        yield "time step", self._start_step.launch
+        if self.model.damped:
+            yield "sharpen accelerations", lambda: self._over_nodes(self._sharpen_acceleration)
+        yield "collect reactions", self._collect_reactions.launch
+        yield "grid to particles and back", lambda: self._over_slabs(self._advance)
+        if self.model.config.order is Order.MUSL:
+            yield "solve re-projection", lambda: self._over_nodes(self._solve_reprojected)
+        if self.model.damped:
+            yield "sharpen velocities", lambda: self._over_nodes(self._sharpen_velocity)
+        yield "strain and material", lambda: self._over_particles(self._update)
+        yield "clear", lambda: self._over_nodes(self._clear)
+        yield "particles to grid", lambda: self._over_slabs(self._scatter_all)
+        yield "solve grid", lambda: self._over_nodes(self._solve_all)
+        yield "end of step", self._end_step.launch
+
+    def _phases_of_usf(self) -> Iterator[tuple[str, Callable[[], None]]]:
+        yield "time step", self._start_step.launch
+        yield "clear", lambda: self._over_nodes(self._clear)
+        yield "momentum to grid", lambda: self._over_slabs(self._scatter_momentum)
+        yield "solve momentum", lambda: self._over_nodes(self._solve_momentum)
+        yield "strain and material", lambda: self._over_particles(self._update)
+        yield "forces to grid", lambda: self._over_slabs(self._scatter_force)
+        yield "solve forces", lambda: self._over_nodes(self._solve_force)
+        yield "collect reactions", self._collect_reactions.launch
+        yield "grid to particles", lambda: self._over_slabs(self._advance)
+        yield "motion", lambda: self._over_particles(self._move)
+        yield "end of step", self._end_step.launch
 
     def sort_if_due(self) -> None:
         """Sort the particles before any of them can drift out of its slab's reach, and for locality."""
@@ -104,7 +117,8 @@ class Solver:
                 ],
                 device=model.device,
             )
-        self._scatter(self._scatter_all)
+        self._over_nodes(self._clear)
+        self._over_slabs(self._scatter_all)
         self._over_nodes(self._solve_all)
         if any(charge.velocities is not None for charge in model.scene.charges):
             kernel = initial_strain_kernel(model.shape)
@@ -114,11 +128,6 @@ class Solver:
         if model.config.order is Order.USF:  # which computes forces anew before it uses any
             state.reactions.zero_()
             state.pending_impulses.zero_()
-
-    def _scatter(self, tasks: list[Task]) -> None:
-        """Empty the nodes that were scattered to, and scatter anew."""
-        self._over_nodes(self._clear)
-        self._over_slabs(tasks)
 
     def _over_slabs(self, tasks: list[Task]) -> None:
         """Particle work that writes to nodes: the even slabs, which share none, then the odd ones."""
@@ -162,7 +171,6 @@ class Solver:
         state, model = self.state, self.model
         order, shape = model.config.order, model.shape
         ambient = model.ambient_pressure
-        strain = STRAINS[order]
         blend = model.pic_share > 0.0
         musl, usf = order is Order.MUSL, order is Order.USF
 
@@ -179,6 +187,7 @@ class Solver:
                 [state.particles, state.grid, state.clock, charge.half_width, model.pic_share],
             )
         )
+        strain = STRAINS[order]
         self._update = self._per_slab(
             lambda slab, charge: (
                 material.update_kernel(shape, strain, model.damped, not usf, charge.eos_class, charge.burn_class),
@@ -205,32 +214,22 @@ class Solver:
 
     def _record_node_phases(self) -> None:
         state, model = self.state, self.model
+        phase = Phase()
+        phase.pic_share = model.pic_share
+        phase.strength = 0.5 * model.shape.spread
+        phase.reactions, phase.impulses, phase.peaks = state.reactions, state.pending_impulses, state.peaks
+        reprojection = Phase()
+        reprojection.impulses = state.impulses
 
-        def solve(momentum: bool, force: bool) -> list[Task]:
-            kernel = grid_kernels.solve_kernel(momentum, force, model.damped)
-            walls = [state.reactions, state.pending_impulses, state.peaks]
-            return self._per_slot(
-                kernel, lambda slot: [state.grid, model.boundary, state.clock, model.pic_share, *walls, slot]
-            )
-
-        self._clear = self._per_slot(grid_kernels.clear, lambda slot: [state.grid, state.clock])
-        self._solve_all = solve(momentum=True, force=True)
+        self._clear = self._per_slot(grid_kernels.clear_kernel(), phase)
+        self._solve_all = self._per_slot(grid_kernels.solve_kernel(True, True, model.damped), phase)
         if model.config.order is Order.USF:
-            self._solve_momentum = solve(momentum=True, force=False)
-            self._solve_force = solve(momentum=False, force=True)
-        self._solve_reprojected = self._per_slot(
-            grid_kernels.solve_reprojected_kernel(model.damped),
-            lambda slot: [state.grid, model.boundary, state.clock, state.impulses, slot],
-        )
+            self._solve_momentum = self._per_slot(grid_kernels.solve_kernel(True, False, model.damped), phase)
+            self._solve_force = self._per_slot(grid_kernels.solve_kernel(False, True, model.damped), phase)
+        self._solve_reprojected = self._per_slot(grid_kernels.solve_reprojected_kernel(model.damped), reprojection)
         if model.damped:
-            strength = 0.5 * model.shape.spread
-            self._sharpen_acceleration = self._per_slot(
-                sharpen.sharpen_acceleration_kernel(),
-                lambda slot: [state.grid, model.boundary, state.clock, strength, state.reactions, slot],
-            )
-            self._sharpen_velocity = self._per_slot(
-                sharpen.sharpen_velocity_kernel(), lambda slot: [state.grid, model.boundary, state.clock, strength]
-            )
+            self._sharpen_acceleration = self._per_slot(sharpen.sharpen_acceleration_kernel(), phase)
+            self._sharpen_velocity = self._per_slot(sharpen.sharpen_velocity_kernel(), phase)
 
     def _per_slab(self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]]) -> list[Task]:
         """One task for each slab, with one recorded launch for each charge that has particles there."""
@@ -240,12 +239,13 @@ class Solver:
             tasks[slab].append(self.launcher.record(kernel, count, [*inputs, begin]))
         return list(tasks)
 
-    def _per_slot(self, kernel: wp.Kernel, inputs: Callable[[int], list[Any]]) -> list[Task]:
+    def _per_slot(self, kernel: wp.Kernel, phase: Phase) -> list[Task]:
         """The blocks of nodes, cut into as many tasks as there are slots."""
-        total, workers = self.state.blocks, self.state.grid.workers
-        edges = [total * slot // self.state.slots for slot in range(self.state.slots + 1)]
+        state = self.state
+        edges = [state.blocks * slot // state.slots for slot in range(state.slots + 1)]
+        inputs = [state.grid, self.model.boundary, state.clock, phase]
         return [
-            [self.launcher.record(kernel, (end - begin) * workers, [*inputs(slot), begin])]
+            [self.launcher.record(kernel, (end - begin) * state.grid.workers, [*inputs, slot, begin])]
             for slot, (begin, end) in enumerate(itertools.pairwise(edges))
             if end > begin
         ]

@@ -1,12 +1,24 @@
 """The state: what changes while a scene is solved, in arrays on the device."""
 
+from typing import Any
+
 import numpy as np
 import warp as wp
 
 from warp_mpm.kernels import arrival, grid, order
 from warp_mpm.kernels.blocks import EDGE, NODES
 from warp_mpm.kernels.precision import NEVER, matrix3, scalar, vector2, vector3, vector4, vector8
-from warp_mpm.kernels.records import TALLIES, Clock, Grid, Maxima, Particles
+from warp_mpm.kernels.records import (
+    TALLIES,
+    BurnTimes,
+    Clock,
+    Grid,
+    Matter,
+    Maxima,
+    Motion,
+    Particles,
+    Position,
+)
 from warp_mpm.kernels.walls import REACTIONS
 from warp_mpm.model import Model
 
@@ -16,21 +28,17 @@ LIGHT = 1e-14  # of a particle's mass: nodes with less count as empty
 LAST_FRACTION = np.float32(0.99999994)  # the largest number below one in single precision
 
 PARTICLE_ARRAYS = (
-    "cell",
-    "fraction",
-    "velocity",
+    "position",
+    "motion",
+    "matter",
+    "burn_times",
     "affine",
-    "mass",
-    "density",
-    "energy",
-    "pressure",
-    "viscous_pressure",
-    "viscous_thrust",
-    "burn_fraction",
-    "arrival_time",
-    "booster_time",
     "index",
 )
+
+
+RECORDS = {"position": Position, "motion": Motion, "matter": Matter, "burn_times": BurnTimes}
+RECORD_OF = {field: name for name, record in RECORDS.items() for field in record.vars}  # of each quantity
 
 
 class State:
@@ -107,8 +115,8 @@ class State:
 
     def positions(self) -> np.ndarray:
         """Positions of all particles (n, 3) float32 [m], in creation order."""
-        cell = self.particles.cell.numpy().astype(np.float64)
-        place = (cell + self.particles.fraction.numpy()) * self.model.spacing + self.model.scene.domain.lower
+        cell = self.values("cell").astype(np.float64)
+        place = (cell + self.values("fraction")) * self.model.spacing + self.model.scene.domain.lower
         return self.in_creation_order(place.astype(np.float32))
 
     def in_creation_order(self, values: np.ndarray) -> np.ndarray:
@@ -118,8 +126,24 @@ class State:
         return result
 
     def field(self, name: str) -> np.ndarray:
-        """A particle array of `Particles`, in creation order."""
-        return self.in_creation_order(getattr(self.particles, name).numpy())
+        """A quantity of all particles (see `kernels/records.py`), in creation order."""
+        return self.in_creation_order(self.values(name))
+
+    def values(self, name: str) -> np.ndarray:
+        """A quantity of all particles, in memory order."""
+        if name in RECORD_OF:
+            return getattr(self.particles, RECORD_OF[name]).numpy()[name]
+        return getattr(self.particles, name).numpy()
+
+    def assign(self, name: str, values: np.ndarray) -> None:
+        """Set a quantity of all particles, in memory order."""
+        if name not in RECORD_OF:
+            getattr(self.particles, name).assign(values)
+            return
+        records = getattr(self.particles, RECORD_OF[name])
+        changed = records.numpy().copy()
+        changed[name] = values
+        records.assign(changed)
 
     def field_pressure(self) -> np.ndarray:
         """Field pressure at the nodes of the domain (nx + 1, ny + 1, nz + 1) [Pa]; a view on a CPU."""
@@ -139,7 +163,7 @@ class State:
         """What a nodal array holds at the nodes of the domain."""
         values = nodal.numpy()
         shape = tuple(n + 3 for n in self.model.scene.domain.cells)
-        return values.reshape(shape + values.shape[1:])[1:-1, 1:-1, 1:-1]
+        return values[: np.prod(shape)].reshape(shape + values.shape[1:])[1:-1, 1:-1, 1:-1]
 
     def _light(self) -> None:
         """Set arrival and booster times from the detonators; particles are in creation order here."""
@@ -159,7 +183,8 @@ class State:
 
 def memory_needed(model: Model) -> int:
     """Bytes that a state of this model takes on its device."""
-    particle = 6 + 3 * 12 + 9 * 4 + 12 + 24 + (36 if model.affine else 0)
+    records = sum(record.numpy_dtype()["itemsize"] for record in RECORDS.values())
+    particle = records + 4 + (36 if model.affine else 0) + 26  # its index; the keys and the scratch of the sort
     node = 8 * 4 + 4 + 2 * 4 + 4 * 4 + (8 * 4 if model.damped else 0)
     nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
     return int(model.scene.particle_count * particle + nodes * node)
@@ -171,7 +196,7 @@ def _allocate_grid(model: Model) -> Grid:
     total = counts[0] * counts[1] * counts[2]
     grid = Grid()
     grid.node = wp.zeros(total, dtype=vector8, device=model.device)
-    grid.pressure = wp.zeros(total, dtype=scalar, device=model.device)
+    grid.pressure = wp.zeros(total + 1, dtype=scalar, device=model.device)
     grid.content = wp.zeros(total, dtype=vector2, device=model.device)
     grid.reprojected = wp.zeros(total, dtype=vector4, device=model.device)
     grid.kick = wp.zeros(total if model.damped else 0, dtype=vector8, device=model.device)
@@ -183,6 +208,7 @@ def _allocate_grid(model: Model) -> Grid:
     grid.stride_x = counts[1] * counts[2]
     grid.stride_y = counts[2]
     grid.spacing = vector3(*model.spacing)
+    grid.inverse_spacing = vector3(*(1.0 / model.spacing))
     grid.light_mass = LIGHT * min(c.material.density * c.particle_volume for c in model.scene.charges)
     return grid
 
@@ -196,26 +222,33 @@ def _place_particles(model: Model) -> Particles:
     cell = np.clip(np.floor(place), 0, np.array(scene.domain.cells) - 1)
     fraction = np.clip((place - cell).astype(np.float32), 0.0, LAST_FRACTION)
 
-    def per_charge(values: list[float]) -> wp.array:
-        repeated = np.repeat(np.array(values, dtype=np.float32), [len(c.positions) for c in scene.charges])
-        return wp.array(repeated, dtype=scalar, device=device)
+    def per_charge(values: list[float]) -> np.ndarray:
+        return np.repeat(np.array(values, dtype=np.float32), [len(c.positions) for c in scene.charges])
 
-    burning = n if model.burns else 0
-    particles = Particles()
-    particles.cell = wp.array(cell.astype(np.int16), dtype=wp.vec3s, device=device)
-    particles.fraction = wp.array(fraction, dtype=vector3, device=device)
+    def records(record: Any, count: int, **values: np.ndarray | float) -> wp.array:
+        """Records with the given values, the other fields 0."""
+        filled = np.zeros(count, dtype=record.numpy_dtype())
+        for name, value in values.items():
+            filled[name] = value
+        return wp.array(filled, dtype=record, device=device)
+
     velocities = [np.zeros_like(c.positions) if c.velocities is None else c.velocities for c in scene.charges]
-    particles.velocity = wp.array(np.concatenate(velocities).astype(np.float32), dtype=vector3, device=device)
+    particles = Particles()
+    particles.position = records(Position, n, cell=cell, fraction=fraction)
+    particles.motion = records(
+        Motion,
+        n,
+        velocity=np.concatenate(velocities),
+        mass=per_charge([c.material.density * c.particle_volume for c in scene.charges]),
+    )
+    particles.matter = records(
+        Matter,
+        n,
+        density=per_charge([c.material.density for c in scene.charges]),
+        energy=per_charge([c.material.specific_energy for c in scene.charges]),
+    )
+    particles.burn_times = records(BurnTimes, n if model.burns else 0, arrival_time=NEVER, booster_time=NEVER)
     particles.affine = wp.zeros(n if model.affine else 0, dtype=matrix3, device=device)
-    particles.mass = per_charge([c.material.density * c.particle_volume for c in scene.charges])
-    particles.density = per_charge([c.material.density for c in scene.charges])
-    particles.energy = per_charge([c.material.specific_energy for c in scene.charges])
-    particles.pressure = wp.zeros(n, dtype=scalar, device=device)
-    particles.viscous_pressure = wp.zeros(n, dtype=scalar, device=device)
-    particles.viscous_thrust = wp.zeros(n, dtype=vector3, device=device)
-    particles.burn_fraction = wp.zeros(burning, dtype=scalar, device=device)
-    particles.arrival_time = wp.full(burning, NEVER, dtype=scalar, device=device)
-    particles.booster_time = wp.full(burning, NEVER, dtype=scalar, device=device)
     particles.index = wp.array(np.arange(n, dtype=np.int32), dtype=int, device=device)
     return particles
 

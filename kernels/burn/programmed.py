@@ -16,7 +16,7 @@ from warp_mpm.kernels.precision import ONE, ZERO, scalar
 class ProgrammedBurnRecord:
     """Device record of the programmed burn."""
 
-    duration: scalar  # time to burn through the zone [s]
+    rate: scalar  # 1 / time to burn through the zone [1/s]
     detonation_speed: scalar  # [m/s]
 
 
@@ -25,7 +25,7 @@ def burn_fraction(
     burn: ProgrammedBurnRecord, previous: scalar, since_arrival: scalar, since_booster: scalar, density: scalar
 ) -> scalar:
     """Burn fraction F in [0, 1], latched at its highest value; times [s] since the wave and the booster came."""
-    ramp = wp.clamp(since_arrival / burn.duration, ZERO, ONE)
+    ramp = wp.clamp(since_arrival * burn.rate, ZERO, ONE)
     boosted = wp.where(since_booster >= ZERO, ONE, ZERO)
     return wp.max(previous, wp.max(ramp, boosted))
 
@@ -53,6 +53,6 @@ class ProgrammedBurn:
     def record(self, burn_width: float, spacing: float) -> ProgrammedBurnRecord:
         """The device record for a zone of `burn_width` cells of size `spacing` [m]."""
         record = ProgrammedBurnRecord()
-        record.duration = burn_width * spacing / self.detonation_speed
+        record.rate = self.detonation_speed / (burn_width * spacing)
         record.detonation_speed = self.detonation_speed
         return record
