@@ -9,31 +9,37 @@ import warp as wp
 from warp_mpm.kernels.records import Grid
 
 EDGE = wp.constant(4)
+SHIFT = wp.constant(2)  # its binary logarithm
 STENCIL = wp.constant(3)  # nodes along an axis, at most
 GHOST_REACH = wp.constant(2)  # nodes from one next to a wall to its ghost behind the wall
 NODES = wp.constant(64)  # of a block
 
 
 @wp.func
-def reached_block(blocks: int, lowest: int, last: int) -> int:
-    """First block along an axis that a stencil reaches, or (`last` = 1) that of its last node's ghost behind a wall."""
-    return wp.min((lowest + 1 + last * (STENCIL - 1 + GHOST_REACH)) // EDGE, blocks - 1)
+def block_of(node: int, blocks: int) -> int:
+    """Block of a node along an axis, by its index; of nodes past the last block, that one."""
+    return wp.min((node + 1) >> SHIFT, blocks - 1)
 
 
 @wp.func
 def stamp_blocks(grid: Grid, lowest: wp.vec3i, step: int):
     """Say that a stencil of three nodes per axis, the lowest given, was scattered to in a step.
 
-    That covers every shape function's nodes, and the cells of the field. What is reached lies in one block or two along
-    an axis: eight writes, some of them twice, without a branch (one per particle is slower than the writes).
+    That covers every shape function's nodes, and the cells of the field. What is reached, ghosts behind walls included,
+    lies in one block or two along an axis: eight writes, some of them twice, without a branch (one per particle is
+    slower than the writes).
     """
+    reach = STENCIL - 1 + GHOST_REACH
+    y = block_of(lowest[1], grid.blocks[1]) * grid.blocks[2]
+    z = block_of(lowest[2], grid.blocks[2])
+    to_y = block_of(lowest[1] + reach, grid.blocks[1]) * grid.blocks[2] - y
+    to_z = block_of(lowest[2] + reach, grid.blocks[2]) - z
     for i in range(2):
-        for j in range(2):
-            for k in range(2):
-                x = reached_block(grid.blocks[0], lowest[0], i)
-                y = reached_block(grid.blocks[1], lowest[1], j)
-                z = reached_block(grid.blocks[2], lowest[2], k)
-                grid.stamps[(x * grid.blocks[1] + y) * grid.blocks[2] + z] = step
+        block = block_of(lowest[0] + i * reach, grid.blocks[0]) * grid.blocks[1] * grid.blocks[2] + y + z
+        grid.stamps[block] = step
+        grid.stamps[block + to_z] = step
+        grid.stamps[block + to_y] = step
+        grid.stamps[block + to_y + to_z] = step
 
 
 @wp.func

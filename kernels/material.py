@@ -30,7 +30,7 @@ class Response:
 
     burn_fraction: scalar
     pressure: scalar  # [Pa]
-    closing_rate: scalar  # d of the viscosity [1/s]
+    closing_rate: scalar  # d of the viscosity [1/s], where there is any
     viscous_pressure: scalar  # its isotropic part [Pa]
     viscous_thrust: vector3  # its directed part is the pressure tensor s s^T [Pa]
     sound_speed: scalar  # of the products [m/s]
@@ -71,37 +71,40 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
         result.burn_fraction = burnt
         result.pressure = burnt * products
         result.sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
-        onset = wp.min(burnt * PER_IGNITED, ONE)
-        axis = directedness(viscosity, result.sound_speed, divergence) * direction
-        share = wp.dot(axis, axis)
-        result.closing_rate = closing_rate(share, closing, divergence)
-        q = onset * viscous_pressure(viscosity, density, result.sound_speed, result.closing_rate)
-        result.viscous_pressure = q * (ONE - share)
-        result.viscous_thrust = wp.sqrt(q) * axis
+        if wp.min(closing, divergence) < ZERO and burnt > ZERO:  # nothing closes in most of an expanding gas
+            axis = directedness(viscosity, result.sound_speed, divergence) * direction
+            share = wp.dot(axis, axis)
+            result.closing_rate = closing_rate(share, closing, divergence)
+            q = viscous_pressure(viscosity, density, result.sound_speed, result.closing_rate)
+            q *= wp.min(burnt * PER_IGNITED, ONE)
+            result.viscous_pressure = q * (ONE - share)
+            result.viscous_thrust = wp.sqrt(q) * axis
         return result
 
     return respond
 
 
 @wp.func
-def rates(
-    response: Response, viscosity: Viscosity, velocity: vector3, divergence: scalar, burn_speed: scalar, moved: scalar
-) -> Maxima:
-    """What limits the next time step, and health figures; `burn_speed` is that of matter not yet burnt, else 0."""
+def rates(response: Response, viscosity: Viscosity, velocity: vector3, divergence: scalar, moved: scalar) -> Maxima:
+    """What limits the next time step, and health figures."""
     sound_speed = response.sound_speed
-    viscous = ZERO
-    if response.burn_fraction > ZERO:
-        viscous = viscous_rate(viscosity, sound_speed, response.closing_rate)
     return Maxima(
-        wp.max(sound_speed + wp.abs(velocity[0]), burn_speed),
-        wp.max(sound_speed + wp.abs(velocity[1]), burn_speed),
-        wp.max(sound_speed + wp.abs(velocity[2]), burn_speed),
+        sound_speed + wp.abs(velocity[0]),
+        sound_speed + wp.abs(velocity[1]),
+        sound_speed + wp.abs(velocity[2]),
         sound_speed + wp.length(velocity),
-        viscous,
+        viscous_rate(viscosity, sound_speed, response.closing_rate),
         wp.abs(divergence),
         moved,
         response.pressure,
     )
+
+
+@wp.func
+def raise_burn_speed(maxima: wp.array(dtype=Maxima), slab: int, burnt: scalar, speed: scalar):
+    """Through matter not yet burnt the wave may come at its own speed [m/s]."""
+    if burnt < ONE:
+        raise_maxima(maxima, slab, Maxima(speed, speed, speed, ZERO, ZERO, ZERO, ZERO, ZERO))
 
 
 @functools.cache
@@ -144,13 +147,10 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
             since_booster,
         )
         particles.matter[p].pressure = response.pressure
-        burn_speed = ZERO
+        raise_maxima(maxima, slab, rates(response, viscosity, particles.motion[p].velocity, ZERO, ZERO))
         if wp.static(burns):
             particles.matter[p].burn_fraction = response.burn_fraction
-            if response.burn_fraction < ONE:
-                burn_speed = burn_parameters.detonation_speed
-        values = rates(response, viscosity, particles.motion[p].velocity, ZERO, burn_speed, ZERO)
-        raise_maxima(maxima, slab, values)
+            raise_burn_speed(maxima, slab, response.burn_fraction, burn_parameters.detonation_speed)
 
     return initialise
 
@@ -229,7 +229,7 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         # Burn fraction and pressures for the next forces.
         since_arrival = ZERO
         since_booster = ZERO
-        if wp.static(burns):
+        if wp.static(burns) and burnt < ONE:
             times = particles.burn_times[p]
             since_arrival = scalar(now.time - wp.float64(times.arrival_time))
             since_booster = scalar(now.time - wp.float64(times.booster_time))
@@ -253,9 +253,8 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         matter.viscous_thrust = response.viscous_thrust
         matter.burn_fraction = response.burn_fraction
         particles.matter[p] = matter
-        burn_speed = ZERO
+        raise_maxima(maxima, slab, rates(response, viscosity, motion.velocity, step.divergence, moved))
         if wp.static(burns):
-            burn_speed = wp.where(response.burn_fraction < ONE, burn_parameters.detonation_speed, ZERO)
-        raise_maxima(maxima, slab, rates(response, viscosity, motion.velocity, step.divergence, burn_speed, moved))
+            raise_burn_speed(maxima, slab, response.burn_fraction, burn_parameters.detonation_speed)
 
     return update

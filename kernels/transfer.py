@@ -21,6 +21,10 @@ from warp_mpm.kernels.stencil import (
 )
 from warp_mpm.kernels.vectors import first_three, second_three
 
+# Square of the speed below which a particle rests: 1e-15 m/s. Ahead of a wave velocities fade from cell to cell without
+# end, and a processor is many times slower with numbers below the smallest normal one.
+STILL = wp.constant(scalar(1.0e-30))
+
 
 @functools.cache
 def lowest_node_function(shape: Shape) -> wp.Function:
@@ -222,6 +226,8 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sha
         velocity = motion.velocity + increment
         if wp.static(blend):
             velocity = (ONE - pic_share) * velocity + pic_share * (first_three(sums) + increment)
+        if wp.dot(velocity, velocity) < STILL:
+            velocity = vector3()
         particles.motion[p].velocity = velocity
         gradient = matrix3()
         if wp.static(affine):

@@ -1,0 +1,1 @@
+"""What `tools/bench.py` measures with: runs to time, limits of the machine, counted bytes and operations, reports."""
