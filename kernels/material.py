@@ -15,6 +15,7 @@ from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Cloc
 from warp_mpm.kernels.relaxation import relax_density
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
+from warp_mpm.kernels.vectors import at_rest_if_slow
 from warp_mpm.kernels.viscosity import Viscosity, closing_rate, directedness, viscous_pressure, viscous_rate
 
 # Where a wave arrives, whether a particle burns already is a matter of round-off: what a switch would turn into a jump
@@ -193,7 +194,7 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         position = particles.position[p]
         step = deform(grid, now, position, motion, matter, half_width)
         if wp.static(damped):
-            motion.velocity += step.damping
+            motion.velocity = at_rest_if_slow(motion.velocity + step.damping)
             particles.motion[p] = motion
         if ambient_pressure != ZERO:
             work = wp.float64(ambient_pressure * dt * step.work_divergence) * wp.float64(mass / matter.density)

@@ -19,12 +19,7 @@ from warp_mpm.kernels.stencil import (
     scatter_gradient_function,
     stencil_type,
 )
-from warp_mpm.kernels.vectors import first_three, second_three
-
-# Square of the speed below which a particle rests: 1e-15 m/s. Ahead of a wave velocities fade from cell to cell without
-# end, and a processor is many times slower with numbers below the smallest normal one.
-STILL = wp.constant(scalar(1.0e-30))
-
+from warp_mpm.kernels.vectors import at_rest_if_slow, first_three, second_three
 
 @functools.cache
 def lowest_node_function(shape: Shape) -> wp.Function:
@@ -225,9 +220,7 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sha
         increment = dt * second_three(sums)
         velocity = motion.velocity + increment
         if wp.static(blend):
-            velocity = (ONE - pic_share) * velocity + pic_share * (first_three(sums) + increment)
-        if wp.dot(velocity, velocity) < STILL:
-            velocity = vector3()
+            velocity = at_rest_if_slow((ONE - pic_share) * velocity + pic_share * (first_three(sums) + increment))
         particles.motion[p].velocity = velocity
         gradient = matrix3()
         if wp.static(affine):

@@ -25,6 +25,17 @@ _MULTIPLY_ADD = f"""
 """
 
 
+# Square of the speed below which a particle rests: 1e-15 m/s. Where particles take velocities over from the grid, they
+# fade ahead of a wave from cell to cell without end, and numbers below the smallest normal one are slow to work with.
+STILL = wp.constant(scalar(1.0e-30))
+
+
+@wp.func
+def at_rest_if_slow(velocity: vector3) -> vector3:
+    """A velocity [m/s], or 0 if it is next to nothing."""
+    return wp.where(wp.dot(velocity, velocity) < STILL, vector3(), velocity)
+
+
 @wp.func
 def first_three(values: Any) -> vector3:
     """The first vector in the lanes of a node."""
