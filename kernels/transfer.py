@@ -21,6 +21,7 @@ from warp_mpm.kernels.stencil import (
 )
 from warp_mpm.kernels.vectors import at_rest_if_slow, first_three, second_three
 
+
 @functools.cache
 def lowest_node_function(shape: Shape) -> wp.Function:
     """Device function: index of the lowest node of a particle's stencil."""

@@ -92,11 +92,12 @@ def start(
     device: str = "cpu",
     *,
     threads: int = 1,
+    graphs: bool | None = None,
     prepare: Callable[[State], None] | None = None,
     **config: Any,
 ) -> Solver:
     """A solver at the start of a scene; `prepare` may change the particles before their first scatter."""
-    launcher = Launcher(find_device(device), threads)
+    launcher = Launcher(find_device(device), threads, graphs)
     state = State(build_model(scene, SolverConfig(**config), launcher.device))
     if prepare is not None:
         prepare(state)

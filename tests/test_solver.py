@@ -99,6 +99,15 @@ def test_any_number_of_threads_gives_the_same_bits(order, transfer, monkeypatch)
     assert len(submitted) > 2 * 60 * 10  # the pool was really used
 
 
+@pytest.mark.parametrize(("order", "transfer"), [(Order.MUSL, Transfer.DAMPED_FLIP), (Order.USF, Transfer.APIC)])
+def test_steps_as_graphs_give_the_same_bits(order, transfer):
+    """A GPU runs a step as one graph, captured anew when the particles were sorted; here a CPU does."""
+    directly = run_on(1, order=order, transfer=transfer)
+    as_graphs = run_on(1, order=order, transfer=transfer, graphs=True)
+    for name, expected in directly.items():
+        np.testing.assert_array_equal(as_graphs[name], expected, err_msg=name)
+
+
 # ---- identity --------------------------------------------------------------------------------------------------------
 
 

@@ -3,11 +3,11 @@
 Warp runs a CPU launch on one thread, but releases the interpreter lock meanwhile. Work is therefore cut into tasks
 that touch disjoint memory, and the cut depends on the domain alone, never on the number of threads: the answer is
 bitwise the same for any number of them. A recorded launch costs 3 microseconds, a trip to the pool ten times that, so
-small problems stay on the calling thread.
+small problems stay on the calling thread. On a GPU a whole step is one graph.
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -24,16 +24,19 @@ SMALLEST_SHARED_WORK = 20_000  # particles or nodes; below, one thread is faster
 class Launcher:
     """Runs tasks of recorded launches on a device.
 
+    With `graphs`, the default on a GPU, a step goes out as one graph; on a CPU that runs on one thread, for tests.
+
     Raises:
         InputError: fewer than one thread.
     """
 
-    def __init__(self, device: wp.Device, threads: int | None = None) -> None:
+    def __init__(self, device: wp.Device, threads: int | None = None, graphs: bool | None = None) -> None:
         available = available_cores()
         if threads is not None and threads < 1:
             raise InputError(f"threads: expected at least 1, got {threads}; leave it out for all {available} cores")
         self.device = device
-        self.threads = 1 if device.is_cuda else (threads or available)
+        self.graphs = device.is_cuda if graphs is None else graphs
+        self.threads = 1 if self.graphs else (threads or available)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
 
     def record(self, kernel: wp.Kernel, count: int, inputs: Sequence[Any]) -> Any:
@@ -48,6 +51,12 @@ class Launcher:
             return
         for finished in [self._pool.submit(_run_task, task) for task in tasks]:
             finished.result()
+
+    def capture(self, run: Callable[[], None]) -> wp.Graph:
+        """What `run` launches, as a graph; nothing is executed yet."""
+        with wp.ScopedCapture(device=self.device) as capture:
+            run()
+        return capture.graph
 
     def close(self) -> None:
         """End the threads."""

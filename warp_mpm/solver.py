@@ -33,15 +33,24 @@ class Solver:
         self.state = state
         self.launcher = launcher
         self.steps_since_sort = 0
+        self._graph: wp.Graph | None = None
         self._record_clock()
         self._record_ranges()
         self._initialise()
 
     def step(self) -> None:
         """One step, of whatever length the state allows."""
+        if self.launcher.graphs:
+            if self._graph is None:
+                self._graph = self.launcher.capture(self._run_phases)
+            wp.capture_launch(self._graph)
+        else:
+            self._run_phases()
+        self.steps_since_sort += 1
+
+    def _run_phases(self) -> None:
         for _, run in self.phases():
             run()
-        self.steps_since_sort += 1
 
     def phases(self) -> Iterator[tuple[str, Callable[[], None]]]:
         """The phases of a step, in order, by name."""
@@ -164,6 +173,7 @@ class Solver:
 
     def _record_ranges(self) -> None:
         """Record every launch over particles and nodes, for the ranges that the last sorting gave."""
+        self._graph = None  # of the ranges before
         self._record_particle_phases()
         self._record_node_phases()
 
