@@ -28,8 +28,8 @@ from warp_mpm.kernels.walls import (
 
 
 @wp.func
-def clear_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
-    """Empty a node."""
+def empty(grid: Grid, n: int):
+    """Empty a node, and the cell of its index."""
     grid.node[n] = vector8()
     grid.pressure[n] = ZERO
     grid.content[n] = vector2()
@@ -40,8 +40,15 @@ def clear_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot:
 
 @wp.func
 def clear_node(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, index: wp.vec3i):
-    """Empty a node, wherever it is."""
-    clear_inside(grid, boundary, now, phase, slot, node_index(grid, index[0], index[1], index[2]))
+    """Empty a node, wherever it is; a ghost may hold values without having been scattered to."""
+    empty(grid, node_index(grid, index[0], index[1], index[2]))
+
+
+@wp.func
+def clear_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+    """Empty a node that was scattered to; every stencil that reaches a cell reaches the node of its index."""
+    if grid.node[n][3] != ZERO:
+        empty(grid, n)
 
 
 def clear_kernel() -> wp.Kernel:

@@ -149,6 +149,8 @@ def sharpen_acceleration_kernel() -> wp.Kernel:
     @wp.func
     def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
         node = grid.node[n]
+        if node[3] == ZERO:
+            return
         if node[3] > grid.light_mass:
             node = multiply_add8(node, phase.strength / node[3], excess_inside(grid, n))
         grid.kick[n] = node
@@ -184,6 +186,8 @@ def sharpen_velocity_kernel() -> wp.Kernel:
     @wp.func
     def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
         values = grid.kick[n]
+        if values[3] == ZERO:
+            return
         if values[3] > grid.light_mass:
             excess_here = excess_inside(grid, n)
             excess_here[3] = ZERO  # mass and filling stay: others read them

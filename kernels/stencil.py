@@ -8,6 +8,7 @@
 Gather and scatter are each other's transpose. Values have several lanes, which a CPU takes together in its vector
 units: Warp's own vectors compile to scalar code there, so the loops are written once, in C++, over a vector type that
 is clang's on a CPU and Warp's on a GPU, where `add` is atomic. On a CPU threads work on slabs that share no node.
+`plain` asks for Warp's type on a CPU too: that is how tests run the code of the GPU.
 """
 
 import functools
@@ -24,10 +25,15 @@ def value_type_of(lanes: int) -> type:
     return scalar if lanes == 1 else wp.types.vector(lanes, scalar)
 
 
-def _lanes(count: int) -> str:
+def _condition(plain: bool) -> str:
+    """When the vector types of the compiler are used: on a CPU, unless told not to."""
+    return "0" if plain else "defined(__clang__) && !defined(__CUDACC__)"
+
+
+def _lanes(count: int, plain: bool) -> str:
     """Type `lanes` of as many values, and how to load and add them at a node."""
     return f"""
-#if defined(__clang__) && !defined(__CUDACC__)
+#if {_condition(plain)}
     typedef {_CTYPE} lanes __attribute__((ext_vector_type({count})));
     auto load = [](const void* node) {{ lanes x; __builtin_memcpy(&x, node, sizeof(x)); return x; }};
     auto add = [=](void* node, lanes x) {{ x += load(node); __builtin_memcpy(node, &x, sizeof(x)); }};
@@ -41,7 +47,7 @@ def _lanes(count: int) -> str:
 """
 
 
-def _scatter_rows(lanes: int, width: int) -> str:
+def _scatter_rows(lanes: int, width: int, plain: bool) -> str:
     """Scatter of values so short that a whole row of them is added at once, as four numbers.
 
     The fourth is beyond a row of three: it is written back as it was. That reaches one node farther than the stencil,
@@ -50,7 +56,7 @@ def _scatter_rows(lanes: int, width: int) -> str:
     return f"""
     {_CTYPE} given[{lanes}];
     memcpy(given, &value, sizeof(given));
-#if defined(__clang__) && !defined(__CUDACC__)
+#if {_condition(plain)}
     typedef {_CTYPE} lanes __attribute__((ext_vector_type(4)));
     lanes along = {{}};
     for (int k = 0; k < {width}; ++k)
@@ -79,8 +85,8 @@ def _result_type(lanes: int) -> str:
     return _CTYPE if lanes == 1 else f"wp::vec_t<{lanes}, {_CTYPE}>"
 
 
-def _gather(lanes: int, width: int) -> str:
-    return f"""{_lanes(lanes)}
+def _gather(lanes: int, width: int, plain: bool) -> str:
+    return f"""{_lanes(lanes, plain)}
     lanes total = {{}};
     for (int i = 0; i < {width}; ++i) {{
         lanes plane = {{}};
@@ -99,8 +105,8 @@ def _gather(lanes: int, width: int) -> str:
 """
 
 
-def _gather_gradient(lanes: int, width: int) -> str:
-    return f"""{_lanes(lanes)}
+def _gather_gradient(lanes: int, width: int, plain: bool) -> str:
+    return f"""{_lanes(lanes, plain)}
     lanes total = {{}}, by_x = {{}}, by_y = {{}}, by_z = {{}};
     for (int i = 0; i < {width}; ++i) {{
         lanes plane = {{}}, plane_y = {{}}, plane_z = {{}};
@@ -130,8 +136,8 @@ def _gather_gradient(lanes: int, width: int) -> str:
 """
 
 
-def _scatter(lanes: int, width: int) -> str:
-    return f"""{_lanes(lanes)}
+def _scatter(lanes: int, width: int, plain: bool) -> str:
+    return f"""{_lanes(lanes, plain)}
     lanes nothing = {{}}, given;
     memcpy(&given, &value, sizeof(lanes));
     for (int i = 0; i < {width}; ++i)
@@ -144,8 +150,8 @@ def _scatter(lanes: int, width: int) -> str:
 """
 
 
-def _scatter_gradient(lanes: int, width: int) -> str:
-    return f"""{_lanes(lanes)}
+def _scatter_gradient(lanes: int, width: int, plain: bool) -> str:
+    return f"""{_lanes(lanes, plain)}
     lanes nothing = {{}}, given, by_x, by_y, by_z;
     memcpy(&given, &value, sizeof(lanes));
     memcpy(&by_x, &x, sizeof(lanes));
@@ -186,49 +192,49 @@ def stencil_type(width: int) -> type:
 
 
 @functools.cache
-def gather_function(width: int, lanes: int) -> wp.Function:
+def gather_function(width: int, lanes: int, plain: bool = False) -> wp.Function:
     """Device function (stencil, nodes) -> sum w x."""
     record = stencil_type(width)
     value_type = value_type_of(lanes)
 
-    @wp.func_native(_gather(lanes, width))
+    @wp.func_native(_gather(lanes, width, plain))
     def gather(stencil: record, nodes: wp.array(dtype=value_type)) -> value_type: ...
 
     return gather
 
 
 @functools.cache
-def gather_gradient_function(width: int, lanes: int) -> wp.Function:
+def gather_gradient_function(width: int, lanes: int, plain: bool = False) -> wp.Function:
     """Device function (stencil, nodes) -> rows sum w x, sum x dw/dx, sum x dw/dy, sum x dw/dz."""
     record = stencil_type(width)
     value_type = value_type_of(lanes)
     rows_type = wp.types.matrix((4, lanes), scalar)
 
-    @wp.func_native(_gather_gradient(lanes, width))
+    @wp.func_native(_gather_gradient(lanes, width, plain))
     def gather_gradient(stencil: record, nodes: wp.array(dtype=value_type)) -> rows_type: ...
 
     return gather_gradient
 
 
 @functools.cache
-def scatter_function(width: int, lanes: int) -> wp.Function:
+def scatter_function(width: int, lanes: int, plain: bool = False) -> wp.Function:
     """Device function (stencil, nodes, value): x += w value."""
     record = stencil_type(width)
     value_type = value_type_of(lanes)
 
-    @wp.func_native(_scatter_rows(lanes, width) if lanes * width <= 4 else _scatter(lanes, width))
+    @wp.func_native(_scatter_rows(lanes, width, plain) if lanes * width <= 4 else _scatter(lanes, width, plain))
     def scatter(stencil: record, nodes: wp.array(dtype=value_type), value: value_type): ...
 
     return scatter
 
 
 @functools.cache
-def scatter_gradient_function(width: int, lanes: int) -> wp.Function:
+def scatter_gradient_function(width: int, lanes: int, plain: bool = False) -> wp.Function:
     """Device function (stencil, nodes, value, x, y, z): nodes += w value + dw/dx x + dw/dy y + dw/dz z."""
     record = stencil_type(width)
     value_type = value_type_of(lanes)
 
-    @wp.func_native(_scatter_gradient(lanes, width))
+    @wp.func_native(_scatter_gradient(lanes, width, plain))
     def scatter_gradient(
         stencil: record,
         nodes: wp.array(dtype=value_type),

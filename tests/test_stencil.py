@@ -16,6 +16,7 @@ SIZES = [(3, 8), (3, 4), (3, 1), (2, 8), (2, 4), (2, 2), (2, 1)]  # width, lanes
 SUMMED = 32 * ROUND_OFF
 
 sizes = pytest.mark.parametrize(("width", "lanes"), SIZES)
+plain_or_not = pytest.mark.parametrize("plain", [False, True], ids=["vectors", "plain"])  # plain is what a GPU runs
 
 
 class Case:
@@ -75,10 +76,10 @@ class Case:
 
 
 @functools.cache
-def gather_kernels(width, lanes):
+def gather_kernels(width, lanes, plain):
     """Kernels that gather values, and values with gradients, into rows."""
     record, value_type = stencils.stencil_type(width), stencils.value_type_of(lanes)
-    gather = stencils.gather_function(width, lanes)
+    gather = stencils.gather_function(width, lanes, plain)
 
     @wp.kernel(enable_backward=False, module="unique")
     def values_of(
@@ -89,7 +90,7 @@ def gather_kernels(width, lanes):
 
     if lanes == 1:
         return values_of, None
-    gather_gradient = stencils.gather_gradient_function(width, lanes)
+    gather_gradient = stencils.gather_gradient_function(width, lanes, plain)
 
     @wp.kernel(enable_backward=False, module="unique")
     def gradients_of(
@@ -104,11 +105,11 @@ def gather_kernels(width, lanes):
 
 
 @functools.cache
-def scatter_kernels(width, lanes):
+def scatter_kernels(width, lanes, plain):
     """Kernels that scatter values, and values with gradients."""
     record, value_type = stencils.stencil_type(width), stencils.value_type_of(lanes)
-    scatter = stencils.scatter_function(width, lanes)
-    scatter_gradient = stencils.scatter_gradient_function(width, lanes)
+    scatter = stencils.scatter_function(width, lanes, plain)
+    scatter_gradient = stencils.scatter_gradient_function(width, lanes, plain)
 
     @wp.kernel(enable_backward=False, module="unique")
     def values_to(
@@ -127,38 +128,41 @@ def scatter_kernels(width, lanes):
     return values_to, gradients_to
 
 
+@plain_or_not
 @sizes
-def test_gather_sums_over_the_nodes(width, lanes, device):
+def test_gather_sums_over_the_nodes(width, lanes, plain, device):
     """Sum w x."""
     case = Case(width, lanes, device)
     results = wp.zeros(COUNT, dtype=case.value_type, device=device)
-    kernel, _ = gather_kernels(width, lanes)
+    kernel, _ = gather_kernels(width, lanes, plain)
     wp.launch(kernel, COUNT, inputs=[case.records(), case.array(case.nodes), results], device=device)
     sums, sizes = case.gathered()
     assert np.all(np.abs(results.numpy().reshape(COUNT, lanes) - sums[0]) <= SUMMED * sizes[0])
 
 
+@plain_or_not
 @pytest.mark.parametrize(("width", "lanes"), [size for size in SIZES if size[1] > 1])
-def test_gather_with_gradients(width, lanes, device):
+def test_gather_with_gradients(width, lanes, plain, device):
     """Sum w x, and with the slopes along one axis in the place of its weights."""
     case = Case(width, lanes, device)
     results = wp.zeros((4, COUNT), dtype=case.value_type, device=device)
-    _, kernel = gather_kernels(width, lanes)
+    _, kernel = gather_kernels(width, lanes, plain)
     wp.launch(kernel, COUNT, inputs=[case.records(), case.array(case.nodes), results], device=device)
     sums, sizes = case.gathered()
     assert np.all(np.abs(results.numpy() - sums) <= SUMMED * sizes)
 
 
 @pytest.mark.parametrize("kinds", [1, 4], ids=["values", "gradients"])
+@plain_or_not
 @sizes
-def test_scatter_adds_to_the_nodes(width, lanes, kinds, device):
+def test_scatter_adds_to_the_nodes(width, lanes, kinds, plain, device):
     """X + w a, and with gradients + dw/dx b + dw/dy c + dw/dz d; nodes of no stencil keep every bit.
 
     Up to COUNT stencils add to a node, one after the other: their roundings are relative to what is there by then.
     """
     case = Case(width, lanes, device)
     nodes = case.array(case.nodes)
-    kernel = scatter_kernels(width, lanes)[kinds > 1]
+    kernel = scatter_kernels(width, lanes, plain)[kinds > 1]
     given = case.given.squeeze(-1) if lanes == 1 else case.given
     values = wp.array(given, dtype=case.value_type, device=device)
     wp.launch(kernel, COUNT, inputs=[case.records(), nodes, values], device=device)
