@@ -23,6 +23,7 @@ from warp_mpm.kernels.walls import REACTIONS
 from warp_mpm.model import Model
 
 GRID_SLOTS = 8  # pieces into which the work on nodes is cut on a CPU
+CACHE_LINE = 64  # [bytes]; a node's eight lanes never lie in two
 NO_STEP = -2  # a stamp that no step has
 LIGHT = 1e-14  # of a particle's mass: nodes with less count as empty
 LAST_FRACTION = np.float32(0.99999994)  # the largest number below one in single precision
@@ -195,11 +196,11 @@ def _allocate_grid(model: Model) -> Grid:
     counts = [n + 3 for n in cells]
     total = counts[0] * counts[1] * counts[2]
     grid = Grid()
-    grid.node = wp.zeros(total, dtype=vector8, device=model.device)
-    grid.pressure = wp.zeros(total + 1, dtype=scalar, device=model.device)
-    grid.content = wp.zeros(total, dtype=vector2, device=model.device)
-    grid.reprojected = wp.zeros(total, dtype=vector4, device=model.device)
-    grid.kick = wp.zeros(total if model.damped else 0, dtype=vector8, device=model.device)
+    grid.node = _sparse_zeros(total, vector8, model.device)
+    grid.pressure = _sparse_zeros(total + 1, scalar, model.device)  # rows are written four numbers at a time
+    grid.content = _sparse_zeros(total, vector2, model.device)
+    grid.reprojected = _sparse_zeros(total, vector4, model.device)
+    grid.kick = _sparse_zeros(total if model.damped else 0, vector8, model.device)
     blocks = [-(-n // EDGE) for n in counts]
     grid.stamps = wp.full(blocks[0] * blocks[1] * blocks[2], NO_STEP, dtype=int, device=model.device)
     grid.blocks = wp.vec3i(*blocks)
@@ -211,6 +212,19 @@ def _allocate_grid(model: Model) -> Grid:
     grid.inverse_spacing = vector3(*(1.0 / model.spacing))
     grid.light_mass = LIGHT * min(c.material.density * c.particle_volume for c in model.scene.charges)
     return grid
+
+
+def _sparse_zeros(count: int, dtype: Any, device: wp.Device) -> wp.array:
+    """Zeros; on a CPU of memory that the system gives where it is touched, so that empty space takes none."""
+    if device.is_cuda or count == 0:
+        return wp.zeros(count, dtype=dtype, device=device)
+    lanes = getattr(dtype, "_length_", 1)
+    kind = np.dtype(wp.dtype_to_numpy(scalar))
+    size = count * lanes * kind.itemsize
+    raw = np.zeros(size + CACHE_LINE, dtype=np.uint8)
+    begin = -raw.ctypes.data % CACHE_LINE
+    values = raw[begin : begin + size].view(kind)
+    return wp.array(values.reshape(count, lanes) if lanes > 1 else values, dtype=dtype, device=device, copy=False)
 
 
 def _place_particles(model: Model) -> Particles:
