@@ -92,6 +92,11 @@ class Model:
         return self.config.transfer is Transfer.DAMPED_FLIP
 
     @property
+    def sharpened(self) -> bool:
+        """Whether the smoothing of the transfer is taken back; the linear shape function's forces are too rough for it."""
+        return self.damped and self.shape.spread > 0.0
+
+    @property
     def affine(self) -> bool:
         """Whether particles carry a velocity gradient."""
         return self.config.transfer is Transfer.APIC

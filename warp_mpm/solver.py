@@ -58,13 +58,13 @@ class Solver:
             yield from self._phases_of_usf()
             return
         yield "time step", self._start_step.launch
-        if self.model.damped:
+        if self.model.sharpened:
             yield "sharpen accelerations", lambda: self._over_nodes(self._sharpen_acceleration)
         yield "collect reactions", self._collect_reactions.launch
         yield "grid to particles and back", lambda: self._over_slabs(self._advance)
         if self.model.config.order is Order.MUSL:
             yield "solve re-projection", lambda: self._over_nodes(self._solve_reprojected)
-        if self.model.damped:
+        if self.model.sharpened:
             yield "sharpen velocities", lambda: self._over_nodes(self._sharpen_velocity)
         yield "strain and material", lambda: self._over_particles(self._update)
         yield "clear", lambda: self._over_nodes(self._clear)
@@ -190,7 +190,7 @@ class Solver:
                 lambda slab, charge: (kernel, [state.particles, state.grid, state.clock, charge.half_width, ambient])
             )
 
-        advance = transfer.advance_kernel(shape, blend, model.affine, musl, model.damped)
+        advance = transfer.advance_kernel(shape, blend, model.affine, musl, model.sharpened)
         self._advance = self._per_slab(
             lambda slab, charge: (
                 advance,
@@ -236,8 +236,8 @@ class Solver:
         if model.config.order is Order.USF:
             self._solve_momentum = self._per_slot(grid_kernels.solve_kernel(True, False, model.damped), phase)
             self._solve_force = self._per_slot(grid_kernels.solve_kernel(False, True, model.damped), phase)
-        self._solve_reprojected = self._per_slot(grid_kernels.solve_reprojected_kernel(model.damped), reprojection)
-        if model.damped:
+        self._solve_reprojected = self._per_slot(grid_kernels.solve_reprojected_kernel(model.sharpened), reprojection)
+        if model.sharpened:
             self._sharpen_acceleration = self._per_slot(sharpen.sharpen_acceleration_kernel(), phase)
             self._sharpen_velocity = self._per_slot(sharpen.sharpen_velocity_kernel(), phase)
 

@@ -186,7 +186,7 @@ def memory_needed(model: Model) -> int:
     """Bytes that a state of this model takes on its device."""
     records = sum(record.numpy_dtype()["itemsize"] for record in RECORDS.values())
     particle = records + 4 + (36 if model.affine else 0) + 26  # its index; the keys and the scratch of the sort
-    node = 8 * 4 + 4 + 2 * 4 + 4 * 4 + (8 * 4 if model.damped else 0)
+    node = 8 * 4 + 4 + 2 * 4 + 4 * 4 + (8 * 4 if model.sharpened else 0)
     nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
     return int(model.scene.particle_count * particle + nodes * node)
 
@@ -200,7 +200,7 @@ def _allocate_grid(model: Model) -> Grid:
     grid.pressure = _sparse_zeros(total + 1, scalar, model.device)  # rows are written four numbers at a time
     grid.content = _sparse_zeros(total, vector2, model.device)
     grid.reprojected = _sparse_zeros(total, vector4, model.device)
-    grid.kick = _sparse_zeros(total if model.damped else 0, vector8, model.device)
+    grid.kick = _sparse_zeros(total if model.sharpened else 0, vector8, model.device)
     blocks = [-(-n // EDGE) for n in counts]
     grid.stamps = wp.full(blocks[0] * blocks[1] * blocks[2], NO_STEP, dtype=int, device=model.device)
     grid.blocks = wp.vec3i(*blocks)

@@ -84,7 +84,7 @@ def weights(width: int) -> int:
 def phase_counts(model: Model) -> dict[str, Count]:
     """The count of every phase of a step, by the names of `Solver.phases`; those of single launches are nothing."""
     damped, usf = model.damped, model.config.order is Order.USF
-    kick = NODE if damped else 0
+    kick = NODE if model.sharpened else 0
     cells = CONTENT if damped else 0
     counts = {
         "time step": Count(),
@@ -109,7 +109,7 @@ def phase_counts(model: Model) -> dict[str, Count]:
         # Velocity, mass and acceleration in, both velocities of the step out; the re-projected sums both ways.
         lanes = 2 * NODE + 2 * REPROJECTED + kick
         counts["solve re-projection"] = Count(node_bytes=NUMBER * lanes, node_operations=SOLVING)
-    if damped:
+    if model.sharpened:
         sharpening = Count(node_bytes=2 * NUMBER * NODE, node_operations=SHARPENING)
         counts |= {"sharpen accelerations": sharpening, "sharpen velocities": sharpening}
     return counts
