@@ -93,7 +93,7 @@ class Model:
 
     @property
     def sharpened(self) -> bool:
-        """Whether the smoothing of the transfer is taken back; the linear shape function's forces are too rough for it."""
+        """Whether the smoothing of the transfer is taken back; linear shape functions are too rough for that."""
         return self.damped and self.shape.spread > 0.0
 
     @property
