@@ -119,8 +119,10 @@ def _plateau(from_cells: int) -> tuple[Bound, ...]:
     return (Bound("plateau_deviation", low=-0.05, high=0.05, from_cells=from_cells, why=why),)
 
 
+# The error falls with the first power of the cell size, as the shock is always some cells wide: a shock that has run 8
+# cells from the axis (40 in all) leaves 16 %, one that has run 32 is within the bound. A sphere would need hundreds.
 PROBLEMS = (
     Noh("noh_planar", "Noh's implosion against a wall", 1, ladder(100, 200), ladder(400), _plateau(100)),
-    Noh("noh_cylindrical", "Noh's implosion onto an axis, a quarter", 2, ladder(40, 80), ladder(160), _plateau(80)),
+    Noh("noh_cylindrical", "Noh's implosion onto an axis, a quarter", 2, ladder(40, 80, 160), (), _plateau(160)),
     Noh("noh_spherical", "Noh's implosion onto a point, an octant", 3, ladder(20, 40), ladder(80), _plateau(40)),
 )
