@@ -6,7 +6,7 @@ import numpy as np
 
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.exact.sedov import SedovBlast
-from warp_mpm.geometry import Box
+from warp_mpm.geometry import Box, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.materials import Material
 from warp_mpm.scene import Scene
@@ -23,22 +23,24 @@ from warp_mpm.verification.fields import (
 )
 from warp_mpm.verification.problem import Bound, Curve, Level, Measurement, Problem, ladder
 from warp_mpm.verification.problems._gas import COLD, RADIUS, gas_panels
+from warp_mpm.volume import measure_volume
 
 SIZE = 1.2  # of the octant [m]
 TIME = 1.0  # [s]
-SOURCE = 0.12  # edge of the cube that holds the energy of the octant at the start [m]
+# A ball: from a cube the shock runs farther along the axes, +2.2 % there and -3.0 % on the diagonal with 60 cells.
+SOURCE = 0.15  # radius of the ball that holds the energy at the start [m]
 SOURCE_PARTICLES = 6  # per axis of a cell: few of them drift apart as they expand, and the shock stays behind
 TABLE = 2001  # radii at which the exact flow is tabulated; between them it is interpolated
 BLAST = SedovBlast(blast_energy=SedovBlast().alpha)  # gamma = 1.4, 1 kg/m3: the shock is at 1 m after 1 s
 
 
 class Sedov(Problem):
-    """A small hot cube in the corner of a cold octant, between slip walls."""
+    """A small hot ball around the corner of a cold octant, between slip walls."""
 
     name = "sedov"
     title = "Sedov's blast wave, an octant"
     statement = (
-        "Energy is released at a point of a cold gas (gamma = 1.4), here in a cube of 0.12 m around it. The shock is "
+        "Energy is released at a point of a cold gas (gamma = 1.4), here in a ball of 0.15 m around it. The shock is "
         "at 1 m after 1 s. 'axis_deviation' and 'diagonal_deviation' are how far it is from there, along an axis and "
         "along the diagonal: the radius at which the field pressure falls through half of its own peak there, less "
         "the exact one, over the exact one."
@@ -54,17 +56,18 @@ class Sedov(Problem):
     )
 
     def scene(self, level: Level) -> Scene:
-        """The source, of as many whole cells as come closest to its size, and the gas around it."""
-        cell = SIZE / level.cells
-        edge = cell * max(1, round(SOURCE / cell))
-        octant, source = Box((0.0, 0.0, 0.0), (SIZE, SIZE, SIZE)), Box((0.0, 0.0, 0.0), (edge, edge, edge))
-        energy = BLAST.blast_energy / 8.0 / (BLAST.initial_density * edge**3)
+        """The source, and the gas around it."""
+        octant, ball = Box((0.0, 0.0, 0.0), (SIZE, SIZE, SIZE)), Sphere((0.0, 0.0, 0.0), SOURCE)
+        around = octant - ball
+        source = octant - around
+        volume, _ = measure_volume(source)  # as the charge will have it, so that the energy is exact
+        energy = BLAST.blast_energy / 8.0 / (BLAST.initial_density * volume)
         gas = IdealGas(BLAST.gamma)
         builder = SceneBuilder(self.name)
-        builder.domain(octant.lower, octant.upper, cell_size=cell)
+        builder.domain(octant.lower, octant.upper, cell_size=SIZE / level.cells)
         hot = Material("source", BLAST.initial_density, gas, energy)
         builder.charge(source, hot, particles_per_axis=SOURCE_PARTICLES, name="source")
-        builder.charge(octant - source, Material("gas", BLAST.initial_density, gas, COLD), name="gas")
+        builder.charge(around, Material("gas", BLAST.initial_density, gas, COLD), name="gas")
         builder.end_time(TIME)
         return builder.build()
 
