@@ -9,7 +9,7 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.blocks import EDGE, NODES, is_active, node_of_block, on_grid
-from warp_mpm.kernels.precision import scalar
+from warp_mpm.kernels.precision import scalar, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index
 from warp_mpm.kernels.walls import Boundary
 
@@ -35,6 +35,21 @@ def lies_inside(grid: Grid, lowest: wp.vec3i) -> bool:
     return inside
 
 
+@wp.func_native("""
+#if defined(__clang__) && !defined(__CUDACC__)
+    for (int i = 0; i < 4; ++i)
+        for (int j = 0; j < 4; ++j) {
+            const char* row = (const char*)(nodes.data + (size_t)(first + i * stride_x + j * stride_y));
+            __builtin_prefetch(row, 1);
+            __builtin_prefetch(row + 64, 1);
+        }
+#endif
+""")
+def prefetch_block(nodes: wp.array(dtype=vector8), first: int, stride_x: int, stride_y: int):
+    """Ask for all rows of a block at once: where gas is thin, a pass is a walk from one wait for memory to the next."""
+    ...
+
+
 @functools.cache
 def node_kernel(visit: wp.Function, visit_inside: wp.Function, age: int) -> wp.Kernel:
     """Kernel over the blocks that were scattered to `age` steps ago, from `begin` on.
@@ -52,8 +67,12 @@ def node_kernel(visit: wp.Function, visit_inside: wp.Function, age: int) -> wp.K
             lowest = node_of_block(grid, block, 0)
             if lies_inside(grid, lowest):
                 first = node_index(grid, lowest[0], lowest[1], lowest[2])
+                if grid.workers == 1:
+                    prefetch_block(grid.node, first, grid.stride_x, grid.stride_y)
+                    if grid.kick.shape[0] > 0:
+                        prefetch_block(grid.kick, first, grid.stride_x, grid.stride_y)
                 for n in range(thread % grid.workers, NODES, grid.workers):
-                    node = first + (n // 16) * grid.stride_x + (n // 4 % 4) * grid.stride_y + n % 4
+                    node = first + (n >> 4) * grid.stride_x + ((n >> 2) & 3) * grid.stride_y + (n & 3)
                     visit_inside(grid, boundary, now, phase, slot, node)
             else:
                 for n in range(thread % grid.workers, NODES, grid.workers):
