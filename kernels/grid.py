@@ -283,7 +283,7 @@ def fold_reprojected(grid: Grid, boundary: Boundary, index: wp.vec3i, owned: wp.
 
 @functools.cache
 def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
-    """Re-projected sums -> velocity v_r and the damping's heat H = alpha (sum w m v^2 / 2 / M - |v_r|^2 / 2) >= 0.
+    """Re-projected sums -> velocity v_r and the damping's heat H = alpha (sum w m v^2 / M - |v_r|^2) >= 0.
 
     Besides, the nodes' velocity v^n becomes v^n + dt a, which moves the particles, and their acceleration the mean
     velocity (v^n + v_r) / 2, which does the work; when `sharpened`, a comes from `kick`, and both velocities go there.

@@ -1,7 +1,7 @@
 """A pass over the nodes of all active blocks: the loop that every grid phase shares.
 
 A phase is two device functions: `visit` works on any node, with what walls and faces ask for; `visit_inside` on a node
-of a block that lies wholly inside, two nodes or more from every face. Nearly all do, and there nothing is special.
+of a block that lies wholly inside, two nodes or more from every face, where nothing is special.
 """
 
 import functools
