@@ -15,6 +15,7 @@ from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Cloc
 from warp_mpm.kernels.relaxation import relax_density
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
+from warp_mpm.kernels.transfer import look_ahead_function
 from warp_mpm.kernels.vectors import at_rest_if_slow
 from warp_mpm.kernels.viscosity import Viscosity, closing_rate, directedness, viscous_pressure, viscous_rate
 
@@ -157,9 +158,12 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
 
 
 @functools.cache
-def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: Any, burn: Any) -> wp.Kernel:
+def update_kernel(
+    shape: Shape, strain: Strain, damped: bool, move: bool, eos: Any, burn: Any, thin: bool = False
+) -> wp.Kernel:
     """Strain, energy, density, damping, motion (`move`), then burn fraction and pressure for the next forces."""
     deform = deformation_function(shape, strain, damped)
+    look_ahead = look_ahead_function(shape, False, strain is Strain.REPROJECTED)
     respond = response_function(eos, burn)
     sound_speed_squared = eos.sound_speed_squared
     eos_record = eos.Record
@@ -188,6 +192,8 @@ def update_kernel(shape: Shape, strain: Strain, damped: bool, move: bool, eos: A
         mass = motion.mass
         if mass == ZERO:
             return
+        if wp.static(thin):
+            look_ahead(particles, grid, p)
         now = clock[0]
         dt = now.dt
         matter = particles.matter[p]

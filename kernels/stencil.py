@@ -171,6 +171,19 @@ def _scatter_gradient(lanes: int, width: int, plain: bool) -> str:
 """
 
 
+def _prefetch(width: int) -> str:
+    return f"""
+#if defined(__clang__) && !defined(__CUDACC__)
+    for (int i = 0; i < {width}; ++i)
+        for (int j = 0; j < {width}; ++j) {{
+            const char* row = (const char*)(nodes.data + (size_t)(first + i * stride_x + j * stride_y));
+            __builtin_prefetch(row, 1);
+            __builtin_prefetch(row + {width} * sizeof(nodes.data[0]) - 1, 1);
+        }}
+#endif
+"""
+
+
 @functools.cache
 def stencil_type(width: int) -> type:
     """Record of a stencil of `width` nodes per axis."""
@@ -245,3 +258,14 @@ def scatter_gradient_function(width: int, lanes: int, plain: bool = False) -> wp
     ): ...
 
     return scatter_gradient
+
+
+@functools.cache
+def prefetch_function(width: int, lanes: int) -> wp.Function:
+    """Device function (nodes, first, stride_x, stride_y): ask for the rows of a stencil, by its lowest node."""
+    value_type = value_type_of(lanes)
+
+    @wp.func_native(_prefetch(width))
+    def prefetch(nodes: wp.array(dtype=value_type), first: int, stride_x: int, stride_y: int): ...
+
+    return prefetch

@@ -15,11 +15,14 @@ from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.stencil import (
     gather_function,
+    prefetch_function,
     scatter_function,
     scatter_gradient_function,
     stencil_type,
 )
 from warp_mpm.kernels.vectors import at_rest_if_slow, first_three, second_three
+
+AHEAD = wp.constant(6)  # places in memory to the particle whose nodes are asked for
 
 
 @functools.cache
@@ -59,6 +62,36 @@ def stencil_function(shape: Shape) -> wp.Function:
         return stencil
 
     return stencil_of
+
+
+@functools.cache
+def look_ahead_function(shape: Shape, sharpened: bool, reprojected: bool, contents: bool = False) -> wp.Function:
+    """Device function (particles, grid, p): ask for the nodes of a particle some places on, before it is its turn.
+
+    That is `kick` when `sharpened`, else `node`; and the re-projection's sums, or the field's and the cells'.
+    """
+    lowest_node = lowest_node_function(shape)
+    prefetch = prefetch_function(shape.width, 8)
+    prefetch_reprojected = prefetch_function(shape.width, 4)
+    prefetch_pressure = prefetch_function(shape.width, 1)
+    prefetch_content = prefetch_function(shape.width, 2)
+
+    @wp.func
+    def look_ahead(particles: Particles, grid: Grid, p: int):
+        position = particles.position[wp.min(p + AHEAD, particles.position.shape[0] - 1)]
+        lowest = lowest_node(position.cell, position.fraction)
+        first = node_index(grid, lowest[0], lowest[1], lowest[2])
+        if wp.static(sharpened):
+            prefetch(grid.kick, first, grid.stride_x, grid.stride_y)
+        else:
+            prefetch(grid.node, first, grid.stride_x, grid.stride_y)
+        if wp.static(reprojected):
+            prefetch_reprojected(grid.reprojected, first, grid.stride_x, grid.stride_y)
+        if wp.static(contents):
+            prefetch_pressure(grid.pressure, first, grid.stride_x, grid.stride_y)
+            prefetch_content(grid.content, first, grid.stride_x, grid.stride_y)
+
+    return look_ahead
 
 
 @functools.cache
@@ -111,7 +144,9 @@ def force_on(force: vector3) -> vector8:
 
 
 @functools.cache
-def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, content: bool) -> wp.Kernel:
+def scatter_kernel(
+    shape: Shape, momentum: bool, force: bool, affine: bool, content: bool, thin: bool = False
+) -> wp.Kernel:
     """Particles -> nodes: momentum, mass and volume (`momentum`); internal force and field pressure (`force`).
 
     sum w m, sum w m v (APIC: v + C (x_i - x_p)), sum w V; f = sum V (p + q - p_ambient + s s^T) grad w, q and s s^T
@@ -123,6 +158,7 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, cont
     node_offset = node_offset_function(shape)
     scatter_gradient = scatter_gradient_function(width, 8)
     scatter_pressure = scatter_function(width, 1)
+    look_ahead = look_ahead_function(shape, False, False, True)
 
     @wp.kernel(enable_backward=False, module="unique")
     def scatter(
@@ -138,6 +174,8 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, cont
         mass = motion.mass
         if mass == ZERO:
             return
+        if wp.static(thin):
+            look_ahead(particles, grid, p)
         matter = particles.matter[p]
         position = particles.position[p]
         cell = position.cell
@@ -181,7 +219,9 @@ def scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, cont
 
 
 @functools.cache
-def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sharpened: bool) -> wp.Kernel:
+def advance_kernel(
+    shape: Shape, blend: bool, affine: bool, reproject: bool, sharpened: bool, thin: bool = False
+) -> wp.Kernel:
     """Nodes -> particle velocity, and for MUSL back again (`reproject`).
 
     FLIP: v += dt sum w a. With `blend` a share s of PIC: (1 - s)(v + dt a) + s sum w (v + dt a)_i; APIC is s = 1 and
@@ -194,6 +234,7 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sha
     node_offset = node_offset_function(shape)
     gather = gather_function(width, 8)
     scatter = scatter_function(width, 4)
+    look_ahead = look_ahead_function(shape, sharpened, reproject)
 
     @wp.kernel(enable_backward=False, module="unique")
     def advance(
@@ -209,6 +250,8 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, sha
         mass = motion.mass
         if mass == ZERO:
             return
+        if wp.static(thin):
+            look_ahead(particles, grid, p)
         dt = clock[0].dt
         position = particles.position[p]
         fraction = position.fraction

@@ -108,6 +108,17 @@ def test_steps_as_graphs_give_the_same_bits(order, transfer):
         np.testing.assert_array_equal(as_graphs[name], expected, err_msg=name)
 
 
+@pytest.mark.parametrize(("order", "transfer"), [(Order.MUSL, Transfer.DAMPED_FLIP), (Order.USF, Transfer.FLIP)])
+def test_asking_ahead_for_nodes_changes_no_bit(order, transfer, monkeypatch):
+    """Where gas is thin, kernels ask for the nodes of particles to come; what they compute is the same."""
+    monkeypatch.setattr("warp_mpm.solver.THIN", np.inf)
+    dense = run_on(1, order=order, transfer=transfer)
+    monkeypatch.setattr("warp_mpm.solver.THIN", 0.0)
+    thin = run_on(1, order=order, transfer=transfer)
+    for name, expected in dense.items():
+        np.testing.assert_array_equal(thin[name], expected, err_msg=name)
+
+
 # ---- identity --------------------------------------------------------------------------------------------------------
 
 
