@@ -1,7 +1,8 @@
 """The scalar type of the simulation, the vector types built on it, and the literals that kernels use.
 
-Warp does not promote a float literal to another scalar type, so kernels take their constants from here: changing
-`scalar` changes the precision of everything. Time and the audited sums are always double.
+Warp does not promote a float literal to another scalar type, so kernels take their constants from here. Time and the
+audited sums are always double. Only single precision works: host code still calls device functions with Python numbers,
+which Warp does not match to a double `scalar`.
 """
 
 import warp as wp
