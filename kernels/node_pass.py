@@ -9,8 +9,9 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.blocks import EDGE, NODES, is_active, node_of_block, on_grid
-from warp_mpm.kernels.precision import scalar, vector8
+from warp_mpm.kernels.precision import scalar
 from warp_mpm.kernels.records import Clock, Grid, node_index
+from warp_mpm.kernels.stencil import prefetch_function
 from warp_mpm.kernels.walls import Boundary
 
 
@@ -35,19 +36,8 @@ def lies_inside(grid: Grid, lowest: wp.vec3i) -> bool:
     return inside
 
 
-@wp.func_native("""
-#if defined(__clang__) && !defined(__CUDACC__)
-    for (int i = 0; i < 4; ++i)
-        for (int j = 0; j < 4; ++j) {
-            const char* row = (const char*)(nodes.data + (size_t)(first + i * stride_x + j * stride_y));
-            __builtin_prefetch(row, 1);
-            __builtin_prefetch(row + 64, 1);
-        }
-#endif
-""")
-def prefetch_block(nodes: wp.array(dtype=vector8), first: int, stride_x: int, stride_y: int):
-    """Ask for all rows of a block at once: where gas is thin, a pass is a walk from one wait for memory to the next."""
-    ...
+# Asks for all rows of a block at once: where gas is thin, a pass is a walk from one wait for memory to the next.
+prefetch_block = prefetch_function(EDGE, 8)
 
 
 @functools.cache

@@ -30,6 +30,11 @@ def _condition(plain: bool) -> str:
     return "0" if plain else "defined(__clang__) && !defined(__CUDACC__)"
 
 
+def _warp_type(lanes: int) -> str:
+    """Warp's own type of as many values, in C++."""
+    return _CTYPE if lanes == 1 else f"wp::vec_t<{lanes}, {_CTYPE}>"
+
+
 def _lanes(count: int, plain: bool) -> str:
     """Type `lanes` of as many values, and how to load and add them at a node."""
     return f"""
@@ -39,7 +44,7 @@ def _lanes(count: int, plain: bool) -> str:
     auto add = [=](void* node, lanes x) {{ x += load(node); __builtin_memcpy(node, &x, sizeof(x)); }};
     auto plus = [](lanes sum, lanes x, {_CTYPE} weight) {{ return __builtin_elementwise_fma(x, (lanes)weight, sum); }};
 #else
-    typedef {_CTYPE if count == 1 else f"wp::vec_t<{count}, {_CTYPE}>"} lanes;
+    typedef {_warp_type(count)} lanes;
     auto load = [](const lanes* node) {{ return *node; }};
     auto add = [](lanes* node, lanes x) {{ wp::atomic_add(node, x); }};
     auto plus = [](lanes sum, lanes x, {_CTYPE} weight) {{ return wp::add(sum, wp::mul(x, weight)); }};
@@ -81,10 +86,6 @@ def _scatter_rows(lanes: int, width: int, plain: bool) -> str:
 """
 
 
-def _result_type(lanes: int) -> str:
-    return _CTYPE if lanes == 1 else f"wp::vec_t<{lanes}, {_CTYPE}>"
-
-
 def _gather(lanes: int, width: int, plain: bool) -> str:
     return f"""{_lanes(lanes, plain)}
     lanes total = {{}};
@@ -99,7 +100,7 @@ def _gather(lanes: int, width: int, plain: bool) -> str:
         }}
         total = plus(total, plane, stencil.wx[i]);
     }}
-    {_result_type(lanes)} result;
+    {_warp_type(lanes)} result;
     memcpy(&result, &total, sizeof(result));
     return result;
 """

@@ -1,6 +1,6 @@
 """Measures how fast the solver is, and how far from what the machine could do.
 
-    python tools/bench.py                      everything (3 minutes on 2 CPU cores)
+    python tools/bench.py                      everything (2 minutes on 2 CPU cores)
     python tools/bench.py --short              everything, smaller and fewer times (under a minute)
     python tools/bench.py --sections phases    some of it
 
