@@ -7,7 +7,7 @@ import numpy as np
 from warp_mpm.geometry import Solid
 from warp_mpm.scene import Domain, Vector
 
-CHUNK = 2_000_000  # sites tested at a time
+CHUNK = 100_000  # sites tested at a time
 
 
 @dataclass(frozen=True)

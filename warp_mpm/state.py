@@ -26,6 +26,7 @@ GRID_SLOTS = 8  # pieces into which the work on nodes is cut on a CPU
 CACHE_LINE = 64  # [bytes]; a node's eight lanes never lie in two
 NO_STEP = -2  # a stamp that no step has
 LIGHT = 1e-14  # of a particle's mass: nodes with less count as empty
+CHUNK = 100_000  # particles placed at a time
 LAST_FRACTION = np.float32(0.99999994)  # the largest number below one in single precision
 
 PARTICLE_ARRAYS = (
@@ -229,42 +230,52 @@ def _sparse_zeros(count: int, dtype: Any, device: wp.Device) -> wp.array:
 
 def _place_particles(model: Model) -> Particles:
     """Particles in creation order, at their initial velocity, density and energy."""
-    scene, device = model.scene, model.device
-    positions = np.concatenate([charge.positions for charge in scene.charges])
-    n = len(positions)
-    place = (positions - scene.domain.lower) / model.spacing
-    cell = np.clip(np.floor(place), 0, np.array(scene.domain.cells) - 1)
-    fraction = np.clip((place - cell).astype(np.float32), 0.0, LAST_FRACTION)
+    device = model.device
+    n = model.scene.particle_count
+    position, motion, matter = (_records(record, n) for record in (Position, Motion, Matter))
+    begin = 0
+    for charge in model.scene.charges:
+        of_charge = slice(begin, begin + len(charge.positions))
+        motion["mass"][of_charge] = charge.material.density * charge.particle_volume
+        if charge.velocities is not None:
+            motion["velocity"][of_charge] = charge.velocities
+        matter["density"][of_charge] = charge.material.density
+        matter["energy"][of_charge] = charge.material.specific_energy
+        _fill_places(position[of_charge], charge.positions, model)
+        begin += len(charge.positions)
+    burn_times = _records(BurnTimes, n if model.burns else 0)
+    for name in BurnTimes.vars:
+        burn_times[name] = NEVER
 
-    def per_charge(values: list[float]) -> np.ndarray:
-        return np.repeat(np.array(values, dtype=np.float32), [len(c.positions) for c in scene.charges])
-
-    def records(record: Any, count: int, **values: np.ndarray | float) -> wp.array:
-        """Records with the given values, the other fields 0."""
-        filled = np.zeros(count, dtype=record.numpy_dtype())
-        for name, value in values.items():
-            filled[name] = value
-        return wp.array(filled, dtype=record, device=device)
-
-    velocities = [np.zeros_like(c.positions) if c.velocities is None else c.velocities for c in scene.charges]
     particles = Particles()
-    particles.position = records(Position, n, cell=cell, fraction=fraction)
-    particles.motion = records(
-        Motion,
-        n,
-        velocity=np.concatenate(velocities),
-        mass=per_charge([c.material.density * c.particle_volume for c in scene.charges]),
-    )
-    particles.matter = records(
-        Matter,
-        n,
-        density=per_charge([c.material.density for c in scene.charges]),
-        energy=per_charge([c.material.specific_energy for c in scene.charges]),
-    )
-    particles.burn_times = records(BurnTimes, n if model.burns else 0, arrival_time=NEVER, booster_time=NEVER)
+    particles.position = _moved(position, Position, device)
+    particles.motion = _moved(motion, Motion, device)
+    particles.matter = _moved(matter, Matter, device)
+    particles.burn_times = _moved(burn_times, BurnTimes, device)
     particles.affine = wp.zeros(n if model.affine else 0, dtype=matrix3, device=device)
-    particles.index = wp.array(np.arange(n, dtype=np.int32), dtype=int, device=device)
+    particles.index = _moved(np.arange(n, dtype=np.int32), int, device)
     return particles
+
+
+def _fill_places(records: np.ndarray, positions: np.ndarray, model: Model) -> None:
+    """Cells and fractions of `positions` (n, 3) [m], some at a time: each step makes arrays of doubles."""
+    last = np.array(model.scene.domain.cells) - 1
+    for begin in range(0, len(positions), CHUNK):
+        chunk = slice(begin, begin + CHUNK)
+        place = (positions[chunk] - model.scene.domain.lower) / model.spacing
+        cell = np.clip(np.floor(place), 0, last)
+        records["cell"][chunk] = cell
+        records["fraction"][chunk] = np.clip((place - cell).astype(np.float32), 0.0, LAST_FRACTION)
+
+
+def _records(record: Any, count: int) -> np.ndarray:
+    """Records on the host, all 0."""
+    return np.zeros(count, dtype=record.numpy_dtype())
+
+
+def _moved(values: np.ndarray, dtype: Any, device: wp.Device) -> wp.array:
+    """An array on the device; on a CPU the very memory of `values`."""
+    return wp.array(values, dtype=dtype, device=device, copy=device.is_cuda)
 
 
 def _start_clock(model: Model) -> wp.array:
