@@ -31,7 +31,7 @@ from warp_mpm.kernels.walls import (
 def empty(grid: Grid, n: int):
     """Empty a node, and the cell of its index."""
     grid.node[n] = vector8()
-    grid.pressure[n] = ZERO
+    grid.field[n] = vector2()
     grid.content[n] = vector2()
     grid.reprojected[n] = vector4()
     if grid.kick.shape[0] > 0:
@@ -94,13 +94,13 @@ def fold(grid: Grid, boundary: Boundary, index: wp.vec3i, owned: wp.vec3i) -> ve
 
 
 @wp.func
-def fold_pressure(grid: Grid, index: wp.vec3i, owned: wp.vec3i) -> scalar:
-    """Sum of sum w V p [J] of a node and its ghosts."""
-    total = ZERO
+def fold_field(grid: Grid, index: wp.vec3i, owned: wp.vec3i) -> vector2:
+    """Sums of w V p and w m c^2 [J] of a node and its ghosts."""
+    total = vector2()
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
-                total += grid.pressure[image_node(grid, index, image_sides(owned, i, j, k))]
+                total += grid.field[image_node(grid, index, image_sides(owned, i, j, k))]
     return total
 
 
@@ -147,7 +147,7 @@ def mirror(
     velocity: vector3,
     acceleration: vector3,
     filling: scalar,
-    pressure: scalar,
+    field: vector2,
 ):
     """Write a node's values into its ghosts; their blocks are stamped with the stencil's, so they are cleared too."""
     for i in range(image_count(owned[0])):
@@ -160,13 +160,13 @@ def mirror(
                     v = wp.cw_mul(s, velocity)
                     a = wp.cw_mul(s, acceleration)
                     grid.node[m] = vector8(v[0], v[1], v[2], grid.node[m][3], a[0], a[1], a[2], filling)
-                    grid.pressure[m] = pressure
+                    grid.field[m] = field
 
 
 @functools.cache
 def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
-    """Sums of the scatter -> values: v = P / M, a = f / M + g; filling = V / V_i, and the field pressure,
-    sum w V p over the occupied volume. `cells` solves their content.
+    """Sums of the scatter -> values: v = P / M, a = f / M + g; filling = V / V_i; the field pressure, sum w V p over
+    the occupied volume, and the sound speed, c^2 = sum w m c^2 / M. `cells` solves their content.
     `momentum` solves the first, `force` the second (all at once but for USF, whose forces come later). Tallies what
     walls add: `reactions` to forces [N], `impulses` to momenta [kg m/s], the latter for PIC and APIC, whose particles
     take the nodes' velocity over with a share of `pic_share`. The highest pressure of nodes at least half filled
@@ -184,13 +184,13 @@ def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
         n = node_index(grid, index[0], index[1], index[2])
         own = grid.node[n]
         total = own
-        pressure_volume = grid.pressure[n]
+        sums = grid.field[n]
         owned = ghost_sides(boundary, grid.cells, index)
         ghosts = owned[0] + owned[1] + owned[2] > 0
         free = free_components(boundary, grid.cells, index)
         if ghosts:
             total = fold(grid, boundary, index, owned)
-            pressure_volume = fold_pressure(grid, index, owned)
+            sums = fold_field(grid, index, owned)
         mass = total[3]
         filling = total[7] / node_volume(grid, index)
         velocity = first_three(own)
@@ -204,22 +204,23 @@ def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
         pressure = ZERO
         if wp.static(force) and mass > grid.light_mass:
             acceleration = wp.cw_mul(free, second_three(total) * inverse + boundary.gravity)
-            pressure = pressure_volume / occupied_volume(grid, index, filling)
+            pressure = sums[0] / occupied_volume(grid, index, filling)
             if not beyond_face(grid, index):
                 if filling >= HALF:
                     raise_maximum(phase.peaks, slot, pressure)
             elif filling > ZERO:
-                pressure = pressure_volume / (node_volume(grid, index) * filling)
+                pressure = sums[0] / (node_volume(grid, index) * filling)
+        field = vector2(pressure, wp.sqrt(sums[1] * inverse))
         if ghosts or free[0] * free[1] * free[2] == ZERO:
             if wp.static(force):
                 tally_walls(grid, boundary, index, owned, True, mass, ONE, acceleration, phase.reactions, slot)
             if wp.static(momentum) and phase.pic_share > ZERO:
                 tally_walls(grid, boundary, index, owned, False, mass, phase.pic_share, velocity, phase.impulses, slot)
-            mirror(grid, boundary, index, owned, velocity, acceleration, filling, pressure)
+            mirror(grid, boundary, index, owned, velocity, acceleration, filling, field)
         grid.node[n] = vector8(
             velocity[0], velocity[1], velocity[2], mass, acceleration[0], acceleration[1], acceleration[2], filling
         )
-        grid.pressure[n] = pressure
+        grid.field[n] = field
 
     @wp.func
     def visit(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, index: wp.vec3i):
@@ -248,8 +249,9 @@ def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
             if mass > grid.light_mass:
                 acceleration = inverse * second_three(node) + boundary.gravity
             share = inside(filling)
-            pressure = inverse * mass * per_volume * grid.pressure[n] / (share * filling + ONE - share)
-            grid.pressure[n] = pressure
+            sums = grid.field[n]
+            pressure = inverse * mass * per_volume * sums[0] / (share * filling + ONE - share)
+            grid.field[n] = vector2(pressure, wp.sqrt(inverse * sums[1]))
             if filling >= HALF:
                 raise_maximum(phase.peaks, slot, pressure)
         grid.node[n] = vector8(
@@ -281,9 +283,16 @@ def fold_reprojected(grid: Grid, boundary: Boundary, index: wp.vec3i, owned: wp.
     return total
 
 
+@wp.func
+def damped_share(now: Clock, sound_speed: scalar) -> scalar:
+    """Alpha of a node: k s / (1 + k s), s the cells that sound crosses in the step."""
+    crossing = now.damping * sound_speed
+    return crossing / (ONE + crossing)
+
+
 @functools.cache
-def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
-    """Re-projected sums -> velocity v_r and the damping's heat H = alpha (sum w m v^2 / M - |v_r|^2) >= 0.
+def solve_reprojected_kernel(sharpened: bool, damped: bool) -> wp.Kernel:
+    """Re-projected sums -> velocity v_r; if `damped` alpha v_r, heat H = alpha (sum w m v^2 / M - |v_r|^2) >= 0, alpha.
 
     Besides, the nodes' velocity v^n becomes v^n + dt a, which moves the particles, and their acceleration the mean
     velocity (v^n + v_r) / 2, which does the work; when `sharpened`, a comes from `kick`, and both velocities go there.
@@ -291,7 +300,7 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
     """
 
     @wp.func
-    def write(grid: Grid, m: int, sign: vector3, v: vector3, heat: scalar, dt: scalar):
+    def write(grid: Grid, m: int, sign: vector3, v: vector3, alpha: scalar, heat: scalar, dt: scalar):
         """Write what belongs to a node, or with other signs to a ghost of it."""
         node = grid.node[m]
         before = first_three(node)
@@ -301,8 +310,11 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
         after = wp.cw_mul(sign, v)
         moving = before + dt * a
         mean = HALF * (before + after)
-        grid.reprojected[m] = vector4(after[0], after[1], after[2], heat)
-        values = vector8(moving[0], moving[1], moving[2], node[3], mean[0], mean[1], mean[2], node[7])
+        shown = after
+        if wp.static(damped):
+            shown = alpha * after
+        grid.reprojected[m] = vector4(shown[0], shown[1], shown[2], heat)
+        values = vector8(moving[0], moving[1], moving[2], node[3], mean[0], mean[1], mean[2], alpha)
         if wp.static(sharpened):
             grid.kick[m] = values
         else:
@@ -321,7 +333,7 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
         mass = grid.node[n][3]
         if mass == ZERO or not is_owner(boundary, grid.cells, index):
             return
-        alpha = now.damping
+        alpha = damped_share(now, grid.field[n][1])
         owned = ghost_sides(boundary, grid.cells, index)
         free = free_components(boundary, grid.cells, index)
         total = grid.reprojected[n]
@@ -340,7 +352,7 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
                         momentum = alpha * vector3(x[0], x[1], x[2])
                         value = alpha * grid.node[m][3] * velocity
                         tally_reaction(boundary, grid, index, sides, momentum, vector3(), value, phase.impulses, slot)
-                    write(grid, m, image_signs(boundary, sides), velocity, heat, now.dt)
+                    write(grid, m, image_signs(boundary, sides), velocity, alpha, heat, now.dt)
 
     @wp.func
     def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
@@ -350,7 +362,8 @@ def solve_reprojected_kernel(sharpened: bool) -> wp.Kernel:
         total = grid.reprojected[n]
         inverse = wp.where(mass > grid.light_mass, ONE / mass, ZERO)
         velocity = inverse * first_three(total)
-        heat = now.damping * wp.max(TWO * total[3] * inverse - wp.dot(velocity, velocity), ZERO)
-        write(grid, n, vector3(ONE, ONE, ONE), velocity, heat, now.dt)
+        alpha = damped_share(now, grid.field[n][1])
+        heat = alpha * wp.max(TWO * total[3] * inverse - wp.dot(velocity, velocity), ZERO)
+        write(grid, n, vector3(ONE, ONE, ONE), velocity, alpha, heat, now.dt)
 
     return node_kernel(solve_node, visit_inside, 1)

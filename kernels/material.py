@@ -35,7 +35,7 @@ class Response:
     closing_rate: scalar  # d of the viscosity [1/s], where there is any
     viscous_pressure: scalar  # its isotropic part [Pa]
     viscous_thrust: vector3  # its directed part is the pressure tensor s s^T [Pa]
-    sound_speed: scalar  # of the products [m/s]
+    sound_speed: scalar  # of the products, burnt or not [m/s]
 
 
 @functools.cache
@@ -94,11 +94,11 @@ def rates(response: Response, viscosity: Viscosity, velocity: vector3, divergenc
         sound_speed + wp.abs(velocity[0]),
         sound_speed + wp.abs(velocity[1]),
         sound_speed + wp.abs(velocity[2]),
-        sound_speed + wp.length(velocity),
         viscous_rate(viscosity, sound_speed, response.closing_rate),
         wp.abs(divergence),
         moved,
         response.pressure,
+        ZERO,
     )
 
 
@@ -149,6 +149,7 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
             since_booster,
         )
         particles.matter[p].pressure = response.pressure
+        particles.matter[p].sound_speed = wp.sqrt(response.burn_fraction) * response.sound_speed
         raise_maxima(maxima, slab, rates(response, viscosity, particles.motion[p].velocity, ZERO, ZERO))
         if wp.static(burns):
             particles.matter[p].burn_fraction = response.burn_fraction
@@ -259,6 +260,7 @@ def update_kernel(
         matter.viscous_pressure = response.viscous_pressure
         matter.viscous_thrust = response.viscous_thrust
         matter.burn_fraction = response.burn_fraction
+        matter.sound_speed = wp.sqrt(response.burn_fraction) * response.sound_speed
         particles.matter[p] = matter
         raise_maxima(maxima, slab, rates(response, viscosity, motion.velocity, step.divergence, moved))
         if wp.static(burns):

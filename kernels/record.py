@@ -19,7 +19,7 @@ def highest_in_region(grid: Grid, nodes: wp.array(dtype=int), begin: int, end: i
     for n in range(begin, end):
         node = nodes[n]
         if grid.node[node][7] >= HALF:
-            peak = wp.max(peak, grid.pressure[node])
+            peak = wp.max(peak, grid.field[node][0])
     return peak
 
 
@@ -31,7 +31,7 @@ def interpolate(grid: Grid, node: int, f: vector3) -> scalar:
         for j in range(2):
             for k in range(2):
                 w = wp.abs(scalar(1 - i) - f[0]) * wp.abs(scalar(1 - j) - f[1]) * wp.abs(scalar(1 - k) - f[2])
-                pressure += w * grid.pressure[node + i * grid.stride_x + j * grid.stride_y + k]
+                pressure += w * grid.field[node + i * grid.stride_x + j * grid.stride_y + k][0]
     return pressure
 
 

@@ -39,6 +39,7 @@ class Matter:
     viscous_pressure: scalar  # isotropic part of the artificial viscosity's pressure [Pa]
     viscous_thrust: vector3  # s: its directed part is the pressure tensor s s^T [Pa]
     burn_fraction: scalar
+    sound_speed: scalar  # of small changes of the pressure: 0 where matter not yet burnt has none [m/s]
 
 
 @wp.struct
@@ -70,10 +71,11 @@ class Grid:
     """The background grid. Nodal quantities turn in place from sums into values (see `grid.py`)."""
 
     node: wp.array(dtype=vector8)  # momentum, mass, force, volume -> velocity, mass, acceleration, filling; and for
-    # the material update of MUSL: velocity that moves the particles, mass, velocity that does the work, filling
-    pressure: wp.array(dtype=scalar)  # sum of w V p [J] -> field pressure [Pa]
+    # the material update of MUSL: velocity that moves the particles, mass, velocity that does the work, alpha
+    field: wp.array(dtype=vector2)  # sums of w V p [J] and w m c^2 [J] -> field pressure [Pa], sound speed [m/s]
     content: wp.array(dtype=vector2)  # of cells: L V p [J] and L V [m3] -> pressure [Pa], filling (see `content.py`)
-    reprojected: wp.array(dtype=vector4)  # momentum, kinetic energy -> velocity, heat of the damping [J/kg]
+    reprojected: wp.array(dtype=vector4)  # momentum, kinetic energy -> velocity, or alpha times it with the
+    # damping [m/s], and its heat [J/kg]
     kick: wp.array(dtype=vector8)  # sharpened acceleration in the lanes of `node`; then what `node` holds for the
     # material update, not yet sharpened (see `sharpen.py`)
     cells: wp.vec3i  # cells of the domain per axis
@@ -96,7 +98,7 @@ class Clock:
     dt: scalar  # of the latest step [s]
     smallest_dt: scalar  # of all steps but a clipped last one [s]
     first_dt: scalar  # [s]
-    damping: scalar  # alpha of the conservative damping in this step
+    damping: scalar  # k dt / l of the conservative damping in this step [s/m]
     drift: scalar  # cells that the fastest particle may have moved since the particles were sorted
     last_drift: scalar  # the same for the latest step alone
     step: int
@@ -105,11 +107,10 @@ class Clock:
 # What particle kernels reduce by maximum, one vector for each slab, and its lanes.
 Maxima = vector8
 SPEED_X = wp.constant(0)  # c + |v_x| [m/s], or the detonation speed if higher; y and z follow
-SIGNAL_SPEED = wp.constant(3)  # c + |v| [m/s]
-VISCOUS_RATE = wp.constant(4)  # [1/s]
-STRAIN_RATE = wp.constant(5)  # |div v| [1/s]
-DISPLACEMENT = wp.constant(6)  # in the latest step [cells]
-PARTICLE_PRESSURE = wp.constant(7)  # [Pa]
+VISCOUS_RATE = wp.constant(3)  # [1/s]
+STRAIN_RATE = wp.constant(4)  # |div v| [1/s]
+DISPLACEMENT = wp.constant(5)  # in the latest step [cells]
+PARTICLE_PRESSURE = wp.constant(6)  # [Pa]; the last lane is free
 
 # What particle kernels tally, one row of double lanes for each slab.
 OUTFLOW_MASS = wp.constant(0)  # for each face: mass [kg], momentum (3) [kg m/s], energy [J]

@@ -3,10 +3,9 @@
 import warp as wp
 
 from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
-from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector3
+from warp_mpm.kernels.precision import HALF, ZERO, scalar, vector3
 from warp_mpm.kernels.records import (
     DISPLACEMENT,
-    SIGNAL_SPEED,
     SPEED_X,
     STRAIN_RATE,
     VISCOUS_RATE,
@@ -20,7 +19,7 @@ from warp_mpm.kernels.walls import Boundary, is_owner
 
 GROWTH = wp.constant(scalar(1.1))  # of the time step, from one step to the next, at most
 LARGEST_STRAIN = wp.constant(scalar(0.2))  # |div v| dt, at most
-DAMPING = 0.25  # k of the conservative damping
+DAMPING = 0.4  # k of the conservative damping
 TINY = wp.constant(scalar(1.0e-30))  # keeps a rate that is zero from being divided by
 
 # Lanes of the audit, one row for each slab.
@@ -57,8 +56,7 @@ def start_step(
     """Choose the time step, advance the time to its end, set the damping, and empty the maxima.
 
     dt = cfl / max over axes of max(c + |v_axis|, D) / h_axis; cfl l^2 / nu for the viscosity; |div v| dt <= 0.2;
-    at most 1.1 times the last; clipped to the end time. alpha = k s / (1 + k s), s = dt max(c + |v|) / h, for the
-    damping k; 0 without it, as walls act on what it moves.
+    at most 1.1 times the last; clipped to the end time. The damping k is 0 without it, as walls act on what it moves.
     """
     now = clock[0]
     rate = largest(maxima, slabs, VISCOUS_RATE)
@@ -78,8 +76,7 @@ def start_step(
         now.smallest_dt = dt
     if not clipped:
         now.smallest_dt = wp.min(now.smallest_dt, dt)
-    crossing = damping * dt * largest(maxima, slabs, SIGNAL_SPEED) / length
-    now.damping = crossing / (ONE + crossing)
+    now.damping = damping * dt / length
     now.dt = dt
     now.step = now.step + 1
     clock[0] = now

@@ -171,6 +171,7 @@ def sharpen_velocity_kernel() -> wp.Kernel:
         if mass == ZERO or not is_owner(boundary, grid.cells, index):
             return
         values = grid.kick[n]
+        alpha = values[7]
         if mass > grid.light_mass:
             free = twice(free_components(boundary, grid.cells, index))
             values += wp.cw_mul(free, excess(grid, boundary, index)) * (phase.strength / mass)
@@ -180,9 +181,8 @@ def sharpen_velocity_kernel() -> wp.Kernel:
                 for k in range(image_count(owned[2])):
                     sides = image_sides(owned, i, j, k)
                     m = image_node(grid, index, sides)
-                    x = grid.node[m]
                     v = wp.cw_mul(twice(image_signs(boundary, sides)), values)
-                    grid.node[m] = vector8(v[0], v[1], v[2], x[3], v[4], v[5], v[6], x[7])
+                    grid.node[m] = vector8(v[0], v[1], v[2], grid.node[m][3], v[4], v[5], v[6], alpha)
 
     @wp.func
     def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
@@ -191,7 +191,7 @@ def sharpen_velocity_kernel() -> wp.Kernel:
             return
         if values[3] > grid.light_mass:
             excess_here = excess_inside(grid, n)
-            excess_here[3] = ZERO  # mass and filling stay: others read them
+            excess_here[3] = ZERO  # mass, which others read, and alpha stay
             excess_here[7] = ZERO
             values = multiply_add8(values, phase.strength / values[3], excess_here)
         grid.node[n] = values

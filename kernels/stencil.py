@@ -52,17 +52,21 @@ def _lanes(count: int, plain: bool) -> str:
 """
 
 
-def _scatter_rows(lanes: int, width: int, plain: bool) -> str:
-    """Scatter of values so short that a whole row of them is added at once, as four numbers.
+ROW = 6  # numbers: rows up to this long are added at once
 
-    The fourth is beyond a row of three: it is written back as it was. That reaches one node farther than the stencil,
-    still short of what another thread may write to (see `LARGEST_DRIFT`), and arrays have a number to spare.
+
+def _scatter_rows(lanes: int, width: int, plain: bool) -> str:
+    """Scatter of values so short that a whole row of them is added at once, as four or eight numbers.
+
+    What is beyond a row of three is written back as it was. That reaches one node farther than the stencil, still short
+    of what another thread may write to (see `LARGEST_DRIFT`), and arrays have a node to spare.
     """
+    numbers = 4 if lanes * width <= 4 else 8
     return f"""
     {_CTYPE} given[{lanes}];
     memcpy(given, &value, sizeof(given));
 #if {_condition(plain)}
-    typedef {_CTYPE} lanes __attribute__((ext_vector_type(4)));
+    typedef {_CTYPE} lanes __attribute__((ext_vector_type({numbers})));
     lanes along = {{}};
     for (int k = 0; k < {width}; ++k)
         for (int lane = 0; lane < {lanes}; ++lane)
@@ -236,7 +240,7 @@ def scatter_function(width: int, lanes: int, plain: bool = False) -> wp.Function
     record = stencil_type(width)
     value_type = value_type_of(lanes)
 
-    @wp.func_native(_scatter_rows(lanes, width, plain) if lanes * width <= 4 else _scatter(lanes, width, plain))
+    @wp.func_native(_scatter_rows(lanes, width, plain) if lanes * width <= ROW else _scatter(lanes, width, plain))
     def scatter(stencil: record, nodes: wp.array(dtype=value_type), value: value_type): ...
 
     return scatter

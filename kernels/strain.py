@@ -5,10 +5,10 @@ dt sum f . w with w = (v^n + v_r) / 2, v_r the re-projected velocity, so e loses
 pressures and volumes of the force. The default transfer sharpens w and the velocity that moves the particles and
 changes their volumes (`sharpen.py`), and the viscosity is a tensor (`viscosity.py`): its work is s . (grad w) s.
 
-The conservative damping moves a particle's velocity vF by alpha of its distance u = sum w (v_r - vF) from what the
-grid sees. The kinetic energy that this takes, sum over the nodes of 2 alpha (K - M |v_r|^2 / 2) less sum over the
-particles of m alpha^2 |u|^2 / 2, returns as heat: the nodes' part by the weights (see `grid.py`), the particles' part
-to each its own. For momentum to be exact, alpha is one number a step.
+The conservative damping moves a particle's velocity vF towards what the grid sees, by u = sum w alpha (v_r - vF), alpha
+a number of each node that follows its sound speed: momentum is exact, because at a node the sum of w m (v_r - vF) is
+zero. The kinetic energy that this takes, sum over the nodes of 2 alpha (K - M |v_r|^2 / 2) less sum over the particles
+of m |u|^2 / 2, returns as heat: the nodes' part by the weights (see `grid.py`), the particles' part to each its own.
 """
 
 import functools
@@ -42,7 +42,7 @@ class StrainIncrement:
     acceleration: vector3  # in direction [m/s]: what the step adds to the velocity
     gradient: matrix3  # grad v [1/s], of the velocity that changes the volume
     work_gradient: matrix3  # of the velocity that does the work [1/s]
-    slip: vector3  # u = sum w (v_r - vF) [m/s]
+    damping: vector3  # u = sum w alpha (v_r - vF) [m/s]
     heat: scalar  # sum w H [J/kg]
 
 
@@ -76,7 +76,7 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
             result.motion += result.acceleration
         if wp.static(reprojected and damped):
             nodal = gather_nodal(stencil, grid.reprojected)
-            result.slip = first_three(nodal) - velocity
+            result.damping = first_three(nodal) - sums[7] * velocity
             result.heat = nodal[3]
         if wp.static(reprojected and not damped):
             nodal_rows = gather_nodal_gradient(stencil, grid.reprojected)
@@ -106,9 +106,9 @@ class Deformation:
 
 
 @wp.func
-def damping_heat(strain: StrainIncrement, alpha: scalar) -> scalar:
-    """Heat that the damping leaves in a particle [J/kg]: what its nodes lose, less what its own slip keeps."""
-    return strain.heat - HALF * alpha * alpha * wp.dot(strain.slip, strain.slip)
+def damping_heat(strain: StrainIncrement) -> scalar:
+    """Heat that the damping leaves in a particle [J/kg]: what its nodes lose, less what its own change keeps."""
+    return strain.heat - HALF * wp.dot(strain.damping, strain.damping)
 
 
 @functools.cache
@@ -140,8 +140,8 @@ def deformation_function(shape: Shape, strain: Strain, damped: bool) -> wp.Funct
         result.direction = unit_vector(strained.acceleration)
         result.closing = wp.dot(result.direction, strained.gradient * result.direction)
         if wp.static(damped):
-            result.energy += damping_heat(strained, now.damping)
-            result.damping = now.damping * strained.slip
+            result.energy += damping_heat(strained)
+            result.damping = strained.damping
             result.around = gather_content(grid, position.cell, position.fraction)
         return result
 

@@ -10,7 +10,7 @@ import warp as wp
 
 from warp_mpm.kernels.blocks import stamp_blocks
 from warp_mpm.kernels.content import lowest_cell, scatter_content
-from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector3, vector4, vector8
+from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector2, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.stencil import (
@@ -73,7 +73,7 @@ def look_ahead_function(shape: Shape, sharpened: bool, reprojected: bool, conten
     lowest_node = lowest_node_function(shape)
     prefetch = prefetch_function(shape.width, 8)
     prefetch_reprojected = prefetch_function(shape.width, 4)
-    prefetch_pressure = prefetch_function(shape.width, 1)
+    prefetch_field = prefetch_function(shape.width, 2)
     prefetch_content = prefetch_function(shape.width, 2)
 
     @wp.func
@@ -88,7 +88,7 @@ def look_ahead_function(shape: Shape, sharpened: bool, reprojected: bool, conten
         if wp.static(reprojected):
             prefetch_reprojected(grid.reprojected, first, grid.stride_x, grid.stride_y)
         if wp.static(contents):
-            prefetch_pressure(grid.pressure, first, grid.stride_x, grid.stride_y)
+            prefetch_field(grid.field, first, grid.stride_x, grid.stride_y)
             prefetch_content(grid.content, first, grid.stride_x, grid.stride_y)
 
     return look_ahead
@@ -150,14 +150,14 @@ def scatter_kernel(
     """Particles -> nodes: momentum, mass and volume (`momentum`); internal force and field pressure (`force`).
 
     sum w m, sum w m v (APIC: v + C (x_i - x_p)), sum w V; f = sum V (p + q - p_ambient + s s^T) grad w, q and s s^T
-    the isotropic and the directed part of the artificial viscosity, sum w V p; and to the
+    the isotropic and the directed part of the artificial viscosity, sum w V p, sum w m c^2; and to the
     cells sum L V p, sum L V (`content`).
     """
     width = shape.width
     stencil_of = stencil_function(shape)
     node_offset = node_offset_function(shape)
     scatter_gradient = scatter_gradient_function(width, 8)
-    scatter_pressure = scatter_function(width, 1)
+    scatter_field = scatter_function(width, 2)
     look_ahead = look_ahead_function(shape, False, False, True)
 
     @wp.kernel(enable_backward=False, module="unique")
@@ -198,7 +198,8 @@ def scatter_kernel(
             force_x = directed[0] * thrust + vector3(push, ZERO, ZERO)
             force_y = directed[1] * thrust + vector3(ZERO, push, ZERO)
             force_z = directed[2] * thrust + vector3(ZERO, ZERO, push)
-            scatter_pressure(stencil, grid.pressure, pressure_volume)
+            elasticity = mass * matter.sound_speed * matter.sound_speed
+            scatter_field(stencil, grid.field, vector2(pressure_volume, elasticity))
         scatter_gradient(stencil, grid.node, scattered, force_on(force_x), force_on(force_y), force_on(force_z))
         if wp.static(affine and momentum):
             for i in range(width):

@@ -148,13 +148,13 @@ def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
     """
     state, model = solver.state, solver.model
     state.grid.node.zero_()
-    state.grid.pressure.zero_()
+    state.grid.field.zero_()
     state.grid.content.zero_()
     kernel = transfer.scatter_kernel(model.shape, True, True, model.affine, model.damped)
     inputs = [state.particles, state.grid, state.clock, model.charges[0].half_width, model.scene.ambient_pressure, 0]
     wp.launch(kernel, state.count, inputs=inputs, device=state.device)
     sums = nodes(solver).astype(np.float64)
-    return sums, state.grid.pressure.numpy()[: sums[..., 0].size].reshape(sums.shape[:3]).astype(np.float64)
+    return sums, state.grid.field.numpy()[: sums[..., 0].size, 0].reshape(sums.shape[:3]).astype(np.float64)
 
 
 def tent_sums(domain: Domain, position: np.ndarray, carried: np.ndarray) -> np.ndarray:

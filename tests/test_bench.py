@@ -104,16 +104,16 @@ def test_what_is_reported_follows_the_counts(report):
 def test_counts_by_hand():
     """B-spline, MUSL, damping: 27 nodes, 9 rows, 3 planes; bytes in numbers of 4 after the 18 of a place."""
     count = counts.phase_counts(model_of())
-    # Mass, density, velocity, two pressures, thrust in; eight lanes, the field's and two of cells, in and out.
-    assert count["particles to grid"].particle_bytes == 18 + 4 * (1 + 1 + 3 + 2 + 3)
-    assert count["particles to grid"].node_bytes == 2 * 4 * (8 + 1 + 2)
-    scattered = 8 * (2 * 27 + 4 * 9) + (27 + 9) + 2 * (8 + 4)
+    # Mass, density, velocity, pressures, sound speed, thrust in; eight lanes, the field's and the cells', in and out.
+    assert count["particles to grid"].particle_bytes == 18 + 4 * (1 + 1 + 3 + 2 + 1 + 3)
+    assert count["particles to grid"].node_bytes == 2 * 4 * (8 + 2 + 2)
+    scattered = 8 * (2 * 27 + 4 * 9) + 2 * (27 + 9) + 2 * (8 + 4)
     assert count["particles to grid"].particle_operations == scattered + 36 + 24 + counts.FORCES
     # Mass in, velocity in and out; eight lanes in, four in and out.
     assert count["grid to particles and back"].particle_bytes == 18 + 4 * 7
     assert count["grid to particles and back"].node_bytes == 4 * (8 + 2 * 4)
     assert count["grid to particles and back"].particle_operations == 8 * (27 + 9 + 3) + 4 * (27 + 9) + 36 + 6
-    assert count["clear"].node_bytes == 4 * (8 + 1 + 2 + 4 + 8)
+    assert count["clear"].node_bytes == 4 * (8 + 2 + 2 + 4 + 8)
     assert count["time step"] == counts.Count()
 
 

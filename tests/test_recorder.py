@@ -97,7 +97,9 @@ def fill_grid(state, pressure, filling):
     pressures, values = np.full(shape, 1e12), np.zeros((*shape, 8))
     inside = (slice(1, -1),) * 3
     pressures[inside], values[(*inside, 7)] = pressure, filling
-    state.grid.pressure.assign(np.append(pressures.ravel(), 0.0).astype(np.float32))  # it has a number to spare
+    field = np.zeros((pressures.size + 1, 2), dtype=np.float32)  # it has a node to spare
+    field[:-1, 0] = pressures.ravel()
+    state.grid.field.assign(field)
     state.grid.node.assign(values.reshape(-1, 8).astype(np.float32))
 
 

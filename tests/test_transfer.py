@@ -80,11 +80,12 @@ def domain_parts(domain):
     return domain.lower, domain.spacing, domain.cells
 
 
-def set_nodes(solver, velocity, acceleration=None):
-    """Give the nodes velocities and accelerations (n, 3); masses stay."""
+def set_nodes(solver, velocity, acceleration=None, alpha=0.0):
+    """Give the nodes velocities and accelerations (n, 3), and shares alpha of the damping (n); masses stay."""
     values = solver.state.grid.node.numpy().copy()
     values[:, 0:3] = velocity
     values[:, 4:7] = 0.0 if acceleration is None else acceleration
+    values[:, 7] = alpha
     solver.state.grid.node.assign(values)
 
 
@@ -221,7 +222,7 @@ def strain_kernel(shape, strain, damped):
         s = gather_strain(grid, position.cell, position.fraction, particles.motion[p].velocity, half_width, dt)
         for axis in range(3):
             rows[p, axis] = s.motion[axis]
-            rows[p, 3 + axis] = s.slip[axis]
+            rows[p, 3 + axis] = s.damping[axis]
         rows[p, 6] = wp.trace(s.gradient)
         rows[p, 7] = wp.trace(s.work_gradient)
         rows[p, 8] = s.heat
@@ -242,14 +243,14 @@ def strains(solver, strain, damped):
 def test_strain_of_affine_fields(shape, device):
     """v = a + B x moves the particles, 2 v does the work, 3 v is re-projected: divergences tr B, 2 tr B and 3 tr B.
 
-    With the damping the volume follows the motion, without it the re-projected velocity; u = sum w (v_r - v_p),
-    the heat is sum w H. USF takes v^n for everything, USL v^n + dt a and, for the
+    With the damping the volume follows the motion, without it the re-projected velocity; u = sum w (alpha v_r) -
+    sum w alpha v_p, the heat is sum w H. USF takes v^n for everything, USL v^n + dt a and, for the
     work, v^n + dt a / 2.
     """
     solver = cloud(shape, device)
     place = node_positions(solver)
     velocity = affine_field(place)
-    set_nodes(solver, velocity, 2.0 * velocity)
+    set_nodes(solver, velocity, 2.0 * velocity, alpha=place[:, 0] / CELL)
     reprojected = np.concatenate([3.0 * velocity, np.full((len(velocity), 1), 7.0)], axis=1)
     solver.state.grid.reprojected.assign(reprojected.astype(np.float32))
     values = particle_values(solver.state)
@@ -262,8 +263,9 @@ def test_strain_of_affine_fields(shape, device):
     np.testing.assert_allclose(rows[:, 0:3], here, rtol=0, atol=SUMMED * fastest)
     np.testing.assert_allclose(rows[:, 6], trace, rtol=0, atol=slope_round_off)
     np.testing.assert_allclose(rows[:, 7], 2.0 * trace, rtol=0, atol=slope_round_off)
-    slip = 3.0 * here - values["velocity"]
-    np.testing.assert_allclose(rows[:, 3:6], slip, rtol=0, atol=SUMMED * fastest)
+    alpha = values["position"][:, :1] / CELL
+    damping = 3.0 * here - alpha * values["velocity"]
+    np.testing.assert_allclose(rows[:, 3:6], damping, rtol=0, atol=SUMMED * fastest * max(1.0, alpha.max()))
     np.testing.assert_allclose(rows[:, 8], 7.0, rtol=SUMMED)
 
     undamped_rows = strains(solver, Strain.REPROJECTED, False)

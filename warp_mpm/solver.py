@@ -246,7 +246,9 @@ class Solver:
         if model.config.order is Order.USF:
             self._solve_momentum = self._per_slot(grid_kernels.solve_kernel(True, False, model.damped), phase)
             self._solve_force = self._per_slot(grid_kernels.solve_kernel(False, True, model.damped), phase)
-        self._solve_reprojected = self._per_slot(grid_kernels.solve_reprojected_kernel(model.sharpened), reprojection)
+        self._solve_reprojected = self._per_slot(
+            grid_kernels.solve_reprojected_kernel(model.sharpened, model.damped), reprojection
+        )
         if model.sharpened:
             self._sharpen_acceleration = self._per_slot(sharpen.sharpen_acceleration_kernel(), phase)
             self._sharpen_velocity = self._per_slot(sharpen.sharpen_velocity_kernel(), phase)

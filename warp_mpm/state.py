@@ -149,7 +149,7 @@ class State:
 
     def field_pressure(self) -> np.ndarray:
         """Field pressure at the nodes of the domain (nx + 1, ny + 1, nz + 1) [Pa]; a view on a CPU."""
-        return self._in_the_domain(self.grid.pressure)
+        return self._in_the_domain(self.grid.field)[..., 0]
 
     def field_density(self) -> np.ndarray:
         """Density at the nodes of the domain (nx + 1, ny + 1, nz + 1) [kg/m3]."""
@@ -187,7 +187,7 @@ def memory_needed(model: Model) -> int:
     """Bytes that a state of this model takes on its device."""
     records = sum(record.numpy_dtype()["itemsize"] for record in RECORDS.values())
     particle = records + 4 + (36 if model.affine else 0) + 26  # its index; the keys and the scratch of the sort
-    node = 8 * 4 + 4 + 2 * 4 + 4 * 4 + (8 * 4 if model.sharpened else 0)
+    node = 8 * 4 + 2 * 4 + 2 * 4 + 4 * 4 + (8 * 4 if model.sharpened else 0)
     nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
     return int(model.scene.particle_count * particle + nodes * node)
 
@@ -198,7 +198,7 @@ def _allocate_grid(model: Model) -> Grid:
     total = counts[0] * counts[1] * counts[2]
     grid = Grid()
     grid.node = _sparse_zeros(total, vector8, model.device)
-    grid.pressure = _sparse_zeros(total + 1, scalar, model.device)  # rows are written four numbers at a time
+    grid.field = _sparse_zeros(total + 1, vector2, model.device)  # rows are written four nodes at a time
     grid.content = _sparse_zeros(total, vector2, model.device)
     grid.reprojected = _sparse_zeros(total, vector4, model.device)
     grid.kick = _sparse_zeros(total if model.sharpened else 0, vector8, model.device)

@@ -26,7 +26,7 @@ from warp_mpm.model import Model
 
 NUMBER = wp.types.type_size_in_bytes(scalar)  # [bytes]
 PLACE = 3 * 2 + 3 * NUMBER  # cell and fraction of a particle [bytes]
-NODE, REPROJECTED, CONTENT, FIELD = 8, 4, 2, 1  # lanes of a node's arrays; those of the cells count as nodes' too
+NODE, REPROJECTED, CONTENT, FIELD = 8, 4, 2, 2  # lanes of a node's arrays; those of the cells count as nodes' too
 AFFINE = 9  # numbers of APIC's velocity gradient
 AXES = 3
 
@@ -133,8 +133,8 @@ def _strain_and_material(model: Model) -> Count:
     """Strain, then the material's answer; between the two nothing leaves the cache."""
     width, order, damped = model.shape.width, model.config.order, model.damped
     musl = order is Order.MUSL
-    # In and out: density, energy, pressure, viscous pressure, viscous thrust; mass and velocity in.
-    numbers = 2 * (4 + AXES) + 1 + AXES + (AXES if damped else 0) + (4 if model.burns else 0)
+    # In and out: density, energy, pressure, viscous pressure, viscous thrust; sound speed out; mass and velocity in.
+    numbers = 2 * (4 + AXES) + 1 + 1 + AXES + (AXES if damped else 0) + (4 if model.burns else 0)
     operations = weights(width) + gather_gradient(width, NODE) + STRAINING + MATERIAL
     lanes = NODE
     if damped:
@@ -150,7 +150,9 @@ def _strain_and_material(model: Model) -> Count:
 def _scatter(model: Model, *, momentum: bool, force: bool) -> Count:
     """Momentum, mass and volume to the nodes, forces and field pressure, and the content of cells."""
     width = model.shape.width
-    numbers = 2 + AXES * momentum + (2 + AXES) * force  # mass, density | velocity | pressures, viscous thrust
+    numbers = (
+        2 + AXES * momentum + (3 + AXES) * force
+    )  # mass, density | velocity | pressures, sound speed, viscous thrust
     operations = weights(width)
     operations += scatter_gradient(width, NODE) if force else scatter(width, NODE)
     lanes = NODE
