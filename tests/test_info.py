@@ -9,7 +9,7 @@ from warp_mpm.detonators import PointDetonator
 from warp_mpm.errors import InputError
 from warp_mpm.output.frame import Frame
 from warp_mpm.output.info import describe
-from warp_mpm.output.tables import HistoryWriter, write_summary
+from warp_mpm.output.tables import TableWriter, write_summary
 from warp_mpm.output.usd import UsdWriter
 
 SCENE = block((6, 4, 2), detonators=(PointDetonator((0.0, 0.02, 0.01), time=2e-6),), end_time=30e-6)
@@ -36,7 +36,7 @@ def run(tmp_path):
         UsdWriter(
             tmp_path / "block.usdc", SCENE, pressure_range=(0.0, 2e9), frames=3, fields=("particleVelocity",)
         ) as usd,
-        HistoryWriter(tmp_path / "history.csv", ["time_s"]) as history,
+        TableWriter(tmp_path / "history.csv", ["time_s"]) as history,
     ):
         for index in range(3):
             usd.write(frame(index))
