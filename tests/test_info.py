@@ -98,6 +98,7 @@ def test_a_run_that_did_not_end(tmp_path):
     writer = UsdWriter(tmp_path / "block.usdc", SCENE, pressure_range=(0.0, 2e9), frames=3)
     for index in range(2):
         writer.write(frame(index))
+    (tmp_path / "block.part.usdc").write_bytes(b"killed while the frames were merged")
     text = describe(tmp_path)
     assert "no summary.json, the run did not end" in text
     assert line_with(text, "block.usda:") == "block.usda: 2 frames, time codes 0 to 1, 0.0 to 15.0 µs"

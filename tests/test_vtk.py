@@ -144,6 +144,7 @@ def test_a_killed_run(scene, tmp_path):
     run = tmp_path / "run"
     run.mkdir()
     written(run, scene, frames=2)
+    (run / "block.part.usdc").write_bytes(b"killed while the frames were merged")
     times, files = series(export(run, tmp_path / "killed.pvd"))
     assert times == list(TIMES[:2])
     saved = frame(scene, 1)

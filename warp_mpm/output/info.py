@@ -15,7 +15,7 @@ from rich.console import Console
 
 from warp_mpm.errors import InputError
 from warp_mpm.output.tables import GAUGE_COLUMNS, print_summary
-from warp_mpm.output.usd_reading import SUFFIXES, frame_times, open_stage, usd_file
+from warp_mpm.output.usd_reading import frame_times, open_stage, usd_file, usd_files
 
 MICROSECOND = 1e-6  # [s]
 COMPLETE = "complete"  # status of a run that came to its end
@@ -38,7 +38,7 @@ def describe(path: str | Path) -> str:
 
 def _describe_run(directory: Path) -> str:
     summary = directory / "summary.json"
-    stages = [file for file in sorted(directory.iterdir()) if file.suffix in SUFFIXES]
+    stages = usd_files(directory)
     if not summary.exists() and not stages:
         raise InputError(
             f"info: expected a run directory with summary.json or a USD file, got {str(directory)!r}, which has neither"

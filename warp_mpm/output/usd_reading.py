@@ -11,6 +11,12 @@ from warp_mpm.errors import InputError
 SUFFIXES = (".usdc", ".usda", ".usdz", ".usd")  # in the order in which they are looked for
 
 
+def usd_files(directory: Path) -> list[Path]:
+    """The whole USD files of a directory, a merged one first; not what a killed run left half written."""
+    files = [file for suffix in SUFFIXES for file in sorted(directory.glob(f"*{suffix}"))]
+    return [file for file in files if not file.stem.endswith(".part")]
+
+
 def usd_file(where: str, path: Path) -> Path:
     """The USD file at a path: that file, or that of a run directory.
 
@@ -22,7 +28,7 @@ def usd_file(where: str, path: Path) -> Path:
         InputError: there is neither.
     """
     if path.is_dir():
-        files = [file for suffix in SUFFIXES for file in sorted(path.glob(f"*{suffix}"))]
+        files = usd_files(path)
         if not files:
             raise mistake(where, "a run directory with a USD file", f"{str(path)!r}, which has none")
         return files[0]
