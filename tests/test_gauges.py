@@ -57,15 +57,15 @@ def test_gas_in_uniform_motion(device):
     (charge,) = scene.charges
     moving_gas = replace(charge, velocities=np.tile(velocity, (len(charge.positions), 1)))
     point = middle(0.2037)
-    gauges = [Gauge("fixed", point), Gauge("moving", point, moving=True), Gauge("edge", middle(-0.8 * CELL))]
+    gauges = [Gauge("fixed", point), Gauge("moving", point, moving=True), Gauge("edge", middle(-1.3 * CELL))]
     scene = with_gauges(replace(scene, charges=(moving_gas,)), *gauges)
     solver = start(scene, device)
     recorder = recorded(solver, 4)
     record = recorder.result()
     tolerance = 32 * ROUND_OFF  # sums over eight nodes of sums over 27 particles
     edge = record.gauges["edge"]
-    assert 0.0 < edge.density[0] < 0.2 * 1.3
-    np.testing.assert_allclose(edge.velocity[0], velocity, atol=tolerance * 400.0)  # of the little mass there is
+    assert 0.0 < edge.density[0] < 0.1 * 1.3
+    np.testing.assert_allclose(edge.velocity[0], velocity, atol=tolerance * 400.0)  # of what mass there is
     for gauge in (record.gauges["fixed"], record.gauges["moving"]):
         np.testing.assert_allclose(gauge.pressure, 0.4 * 1.3 * 1e5, rtol=tolerance)
         np.testing.assert_allclose(gauge.density, 1.3, rtol=tolerance)
