@@ -120,6 +120,15 @@ def test_usd_of_another_program(tmp_path):
     assert line_with(text, "/Cube") == "/Cube  Cube"
 
 
+def test_a_surface_that_changes(tmp_path):
+    stage = Usd.Stage.CreateNew(str(tmp_path / "other.usda"))
+    points = UsdGeom.Mesh.Define(stage, "/Surface").CreatePointsAttr()
+    points.Set([(0, 0, 0)] * 3, 0.0)
+    points.Set([(0, 0, 0)] * 1200, 1.0)
+    stage.Save()
+    assert line_with(describe(tmp_path / "other.usda"), "/Surface") == "/Surface  Mesh  3 to 1,200 points"
+
+
 def damaged(run, name: str):
     """A path that is no result, by what is wrong with it."""
     if name == "truncated":

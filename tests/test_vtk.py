@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
+from pxr import Sdf, Usd, UsdGeom, Vt
 from scenes_for_tests import OPEN, block
 
 from warp_mpm.errors import InputError, SimulationError
@@ -149,6 +150,31 @@ def test_a_killed_run(scene, tmp_path):
     assert times == list(TIMES[:2])
     saved = frame(scene, 1)
     np.testing.assert_array_equal(meshio.read(files[1]).point_data["pressure"], saved.pressure[saved.inside])
+
+
+def test_a_surface_that_changes(tmp_path):
+    """Every mesh is exported, triangles and quadrilaterals, as it is in each frame; nothing where it is hidden."""
+    stage = Usd.Stage.CreateNew(str(tmp_path / "run.usda"))
+    world = UsdGeom.Xform.Define(stage, "/World").GetPrim()
+    stage.SetDefaultPrim(world)
+    stage.SetEndTimeCode(1.0)
+    mesh = UsdGeom.Mesh.Define(stage, "/World/surface")
+    points = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]])
+    for code, visibility in enumerate(("invisible", "inherited")):
+        world.CreateAttribute("blast:time", Sdf.ValueTypeNames.Double).Set(1e-6 * code, code)
+        mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(points), code)
+        mesh.CreateFaceVertexCountsAttr().Set([4, 3], code)
+        mesh.CreateFaceVertexIndicesAttr().Set([0, 1, 2, 3, 1, 4, 2], code)
+        mesh.CreateVisibilityAttr().Set(visibility, code)
+    stage.Save()
+    export(tmp_path / "run.usda", tmp_path / "run.pvd")
+    times, (hidden, shown) = series(tmp_path / "run_surface.pvd")
+    assert times == [0.0, 1e-6]
+    assert 'NumberOfPoints="0" NumberOfCells="0"' in hidden.read_text()
+    read = meshio.read(shown)
+    np.testing.assert_array_equal(read.points, points)
+    np.testing.assert_array_equal(read.cells_dict["triangle"], [[1, 4, 2]])
+    np.testing.assert_array_equal(read.cells_dict["quad"], [[0, 1, 2, 3]])
 
 
 def test_times_rise(tmp_path):

@@ -48,9 +48,10 @@ def _describe_run(directory: Path) -> str:
     width = max(len(str(file.relative_to(directory))) for file in files)
     lines = (f"{file.relative_to(directory)!s:{width}}  {_size(file):>9}  {_table_note(file)}" for file in files)
     parts.append("\n".join(line.rstrip() for line in lines))
-    for stage in stages:
-        opened = open_stage("info", stage)
-        parts.append("\n".join([f"{stage.name}: {_time_line(opened)}", *_field_lines(opened)]))
+    for file in stages[:1]:  # further ones, such as a package, hold the same
+        stage = open_stage("info", file)
+        shapes = (prim for prim in stage.Traverse() if prim.IsA(UsdGeom.PointBased))
+        parts.append("\n".join([f"{file.name}: {_time_line(stage)}", *_prim_lines(shapes)]))
     return "\n\n".join(parts)
 
 
@@ -94,12 +95,8 @@ def _usd_lines(stage: Any) -> Iterator[str]:
     yield from _prim_lines(stage.Traverse())
 
 
-def _field_lines(stage: Any) -> Iterator[str]:
-    """Lines for the prims that have fields, and for these."""
-    return _prim_lines(prim for prim in stage.Traverse() if UsdGeom.PrimvarsAPI(prim).HasPrimvar("pressure"))
-
-
 def _prim_lines(prims: Iterable[Any]) -> Iterator[str]:
+    """A line for each prim and each of its fields."""
     for prim in prims:
         yield f"{prim.GetPath()}  {prim.GetTypeName()}{_prim_note(prim)}"
         for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues():
@@ -122,8 +119,10 @@ def _prim_note(prim: Any) -> str:
         x, y, z = UsdGeom.Xformable(prim).GetLocalTransformation().ExtractTranslation()
         return f"  at ({x:g}, {y:g}, {z:g}) m, lit at {ignition.Get() / MICROSECOND:g} µs"
     if prim.IsA(UsdGeom.PointBased):
-        points = UsdGeom.PointBased(prim).GetPointsAttr().Get(Usd.TimeCode.EarliestTime())
-        return f"  {len(points or ()):,} points"
+        points = UsdGeom.PointBased(prim).GetPointsAttr()
+        changing = prim.IsA(UsdGeom.Mesh) and points.GetTimeSamples()
+        counts = {len(points.Get(code) or ()) for code in changing or [Usd.TimeCode.EarliestTime()]}
+        return f"  {' to '.join(f'{count:,}' for count in sorted({min(counts), max(counts)}))} points"
     return ""
 
 

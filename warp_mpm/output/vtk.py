@@ -89,7 +89,12 @@ def _write_collection(path: Path, frames: Path, name: str, times: list[float], s
 
 
 def _mesh(shape: Any, code: int) -> meshio.Mesh:
-    """A shape in a frame. Of particles those that have left through an open face, which have no width, are left out."""
+    """A shape in a frame; empty where it is hidden.
+
+    Of particles those that have left through an open face, which have no width, are left out.
+    """
+    if shape.ComputeVisibility(code) == UsdGeom.Tokens.invisible:
+        return meshio.Mesh(np.empty((0, 3), np.float32), [])
     points = _array(shape.GetPointsAttr(), code).reshape(-1, 3)
     data = dict(_vertex_data(shape, code, len(points)))
     if not shape.GetPrim().IsA(UsdGeom.Points):
