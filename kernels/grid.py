@@ -261,12 +261,18 @@ def solve_kernel(momentum: bool, force: bool, cells: bool) -> wp.Kernel:
     return node_kernel(visit, visit_inside, 0)
 
 
+@wp.func
+def node_density(grid: Grid, index: wp.vec3i) -> scalar:
+    """Density at a node of the domain [kg/m3]: mass over the occupied volume, as the field pressure."""
+    node = grid.node[node_index(grid, index[0], index[1], index[2])]
+    return node[3] / occupied_volume(grid, index, node[7])
+
+
 @wp.kernel(enable_backward=False)
 def measure_density(grid: Grid, density: wp.array3d(dtype=scalar)):
-    """Density at the nodes of the domain [kg/m3]: mass over the occupied volume, as the field pressure."""
+    """Density at the nodes of the domain [kg/m3]."""
     i, j, k = wp.tid()
-    node = grid.node[node_index(grid, i, j, k)]
-    density[i, j, k] = node[3] / occupied_volume(grid, wp.vec3i(i, j, k), node[7])
+    density[i, j, k] = node_density(grid, wp.vec3i(i, j, k))
 
 
 @wp.func

@@ -238,6 +238,11 @@ CALLS = [
     (lambda b: b.front_path((0, 0, 0), (0, 0, 0)), "front_path: end: expected another point than start"),
     (lambda b: b.line((0, 0, 0), (0, 0, math.nan)), "line: end: expected three finite numbers"),
     (lambda b: b.collision_point((0, 0, math.nan)), "collision_point 1: expected three finite numbers"),
+    (lambda b: b.gauge((0, 0)), "gauge 'gauge_1': point: expected three finite numbers, got (0, 0)"),
+    (lambda b: b.gauge((0, 0, 0), name="p, q"), "gauge 'p, q': name: expected letters, digits, '_', '-' and '.', got"),
+    (lambda b: b.gauge((0, 0, 0), name=7), "gauge 7: name: expected letters, digits, '_', '-' and '.', got 7"),
+    (lambda b: [b.gauge((0, 0, 0), name="a") for _ in "ab"], "gauge 'a': expected a name of its own, got one that"),
+    (lambda b: b.gauge((0, 0, 0), moving="yes"), "gauge 'gauge_1': moving: expected True or False, got 'yes'"),
     (lambda b: b.picture_times([-1.0]), "picture_times: expected a number of at least 0, got -1.0"),
     (lambda b: b.section(3, 0.0), "section: axis: expected 0, 1 or 2, got 3"),
     (lambda b: b.section(0, math.nan), "section: coordinate: expected a finite number, got nan"),
@@ -262,8 +267,25 @@ BUILDS = [
     (lambda b: b.front_path((0.05, 0.05, 0.05), (0.05, 0.05, 0.2)), "front_path: end: expected inside the domain"),
     (lambda b: b.line((0.05, 0.05, -0.1), (0.05, 0.05, 0.1)), "line: start: expected inside the domain"),
     (lambda b: b.section(2, 0.2), "section: expected inside the domain"),
+    (lambda b: b.gauge((0.05, 0.05, 0.2)), "gauge 'gauge_1': expected inside the domain"),
     (lambda b: b.picture_times([2e-5]), "picture_times: expected at most the end time, 1e-05 s, got 2e-05 s"),
 ]
+
+
+def test_a_moving_gauge_needs_matter_to_move_with():
+    """It is carried by the nearest particle of any charge, at most a cell away; one that stays may be in a vacuum."""
+    builder = cube_builder(cell_size=0.01, margins=0.05)
+    builder.charge(Box((0.12, 0.0, 0.0), (0.14, 0.1, 0.1)), INERT)
+    builder.gauge((0.131, 0.024, 0.099), moving=True)
+    builder.gauge((0.11, 0.05, 0.05))
+    scene = builder.build()
+    carried, fixed = scene.gauges
+    positions = np.concatenate([charge.positions for charge in scene.charges])
+    assert positions[carried.particle] == pytest.approx((0.1325, 0.0225, 0.0975))
+    assert (fixed.name, fixed.moving, fixed.particle) == ("gauge_2", False, None)
+    builder.gauge((-0.03, 0.0525, 0.0525), name="far", moving=True)
+    expected = "gauge 'far': expected matter within a cell of (-0.03, 0.0525, 0.0525) m to move with, got the nearest"
+    assert f"{expected} particle 3.2 cells away; place it" in refusal(builder.build)
 
 
 @pytest.mark.parametrize(("call", "message"), BUILDS, ids=[message for _, message in BUILDS])

@@ -66,6 +66,9 @@ MISTAKES = [
     (("run", "two_point", "--bogus"), "unrecognized arguments: --bogus"),
     (("list", "nowhere"), "expected a directory of scene files, got 'nowhere'"),
     (("info", "nowhere"), "expected a run directory or a USD file, got 'nowhere'"),
+    (("export", "nowhere"), "the following arguments are required: --to"),
+    (("export", "nowhere", "--to", "x.pvd"), "export: expected a run directory or a USD file, got 'nowhere'"),
+    (("export", ".", "--to", "x.obj"), "export: --to: expected a file that ends in .pvd, or a directory for ParaView"),
     (("run", "two_pont"), "expected a scene file, or one of"),
     (("run", "nowhere/two_point.py"), "got 'nowhere/two_point.py'"),
     ((*RUN, "cel_size=1"), "scene two_point: expected one of cell_size"),
@@ -169,7 +172,7 @@ def test_other_ends_are_one_line_too(capfd, monkeypatch, raised, exit_code, text
     assert errors.count("\n") == 1
 
 
-def test_run_then_info(capfd, tmp_path, monkeypatch):
+def test_run_then_info_and_export(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "two_point", "--set", *COARSE, "--frames", "2", "--solver", "burn_width=2"]) == 0
     output, errors = capfd.readouterr()
@@ -179,10 +182,12 @@ def test_run_then_info(capfd, tmp_path, monkeypatch):
     assert summary["parameters"]["cell_size"] == 2e-2
     assert main(["info", os.path.join("out", "two_point")]) == 0
     assert "two_point" in capfd.readouterr().out
+    assert main(["export", os.path.join("out", "two_point"), "--to", "paraview"]) == 0
+    assert capfd.readouterr().out == os.path.join("paraview", "two_point.pvd") + "\n"
 
 
 def test_importing_the_package_is_light():
-    heavy = ("warp", "pxr", "matplotlib", "pyvista", "rich")
+    heavy = ("warp", "pxr", "matplotlib", "pyvista", "vtk", "meshio", "rich")
     code = f"import sys, warp_mpm, warp_mpm.cli; print([name for name in {heavy} if name in sys.modules])"
     assert python("-c", code).stdout == "[]\n"
 

@@ -3,7 +3,7 @@
 import pytest
 import warp as wp
 
-from warp_mpm.kernels import grid, material, reduce, shape, sharpen, strain, transfer
+from warp_mpm.kernels import gauges, grid, material, reduce, shape, sharpen, strain, transfer
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
@@ -22,6 +22,7 @@ KERNELS = {
     "sharpen_acceleration": sharpen.sharpen_acceleration_kernel,
     "sharpen_velocity": sharpen.sharpen_velocity_kernel,
     "start_step": lambda: reduce.start_step,
+    "record_gauges": lambda: gauges.record_gauges,
     "initial_strain": lambda: initial_strain_kernel(shape.BSPLINE),
 }
 

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from warp_mpm.errors import SimulationError
-from warp_mpm.output.tables import COLLISION_RATIO, HistoryWriter, print_summary, write_summary
+from warp_mpm.output.tables import COLLISION_RATIO, TableWriter, print_summary, write_summary
 
 SUMMARY = {
     "scene": "two_point",
@@ -60,7 +60,7 @@ def line_with(text: str, start: str) -> list[str]:
 
 def test_history_is_on_disk_row_by_row_and_reads_back_exactly(tmp_path):
     times = [0.1 + 0.2, np.float64(1) / 3, np.float32(0.1)]
-    with HistoryWriter(tmp_path / "history.csv", ["time_s", "step"]) as history:
+    with TableWriter(tmp_path / "history.csv", ["time_s", "step"]) as history:
         for count, time in enumerate(times, start=1):
             history.write({"step": count, "time_s": time, "not a column": 7})
             assert len(rows_of(tmp_path / "history.csv")) == count
@@ -71,13 +71,13 @@ def test_history_is_on_disk_row_by_row_and_reads_back_exactly(tmp_path):
 
 
 def test_history_leaves_out_what_is_no_number(tmp_path):
-    with HistoryWriter(tmp_path / "history.csv", ["a", "b", "c"]) as history:
+    with TableWriter(tmp_path / "history.csv", ["a", "b", "c"]) as history:
         history.write({"a": np.nan, "b": float("inf"), "c": 1.0})
     assert rows_of(tmp_path / "history.csv") == [{"a": "", "b": "", "c": "1.0"}]
 
 
 def test_history_misses_no_column(tmp_path):
-    with HistoryWriter(tmp_path / "history.csv", ["a", "b"]) as history, pytest.raises(KeyError, match="b"):
+    with TableWriter(tmp_path / "history.csv", ["a", "b"]) as history, pytest.raises(KeyError, match="b"):
         history.write({"a": 1.0})
 
 
@@ -122,7 +122,7 @@ def test_a_summary_that_cannot_be_replaced_stays_whole(tmp_path, monkeypatch):
     assert [file.name for file in tmp_path.iterdir()] == ["summary.json"]
 
 
-@pytest.mark.parametrize("write", [write_summary, HistoryWriter])
+@pytest.mark.parametrize("write", [write_summary, TableWriter])
 def test_a_file_that_cannot_be_made_is_one_line(tmp_path, write):
     (tmp_path / "file").write_text("not a directory")
     with pytest.raises(SimulationError, match="cannot write") as caught:

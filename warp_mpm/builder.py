@@ -12,13 +12,16 @@ from warp_mpm.cells import check_aspect, domain_of_cells
 from warp_mpm.charges import Body, charge_warnings, check_fit, cut_charges
 from warp_mpm.checks import mistake
 from warp_mpm.detonators import Detonator, PlaneDetonator
+from warp_mpm.gauges import carried_gauges
 from warp_mpm.geometry import Solid
 from warp_mpm.ignition import resolve_detonators
 from warp_mpm.lattice import Lattice
 from warp_mpm.materials import Material
-from warp_mpm.scene import Domain, Scene, SectionPlane, Segment, Vector, Walls
+from warp_mpm.scene import Domain, Gauge, Scene, SectionPlane, Segment, Vector, Walls
 
 OUTSIDE_TOLERANCE = 1e-9  # of the domain's size
+NAME = r"\w[\w.-]*"  # that suits a file, and the header of a table
+NAME_EXPECTED = "letters, digits, '_', '-' and '.'"
 PICTURES = 6  # instants worth a picture, if a scene names none
 
 Given = TypeVar("Given")
@@ -41,8 +44,8 @@ class SceneBuilder:
         Raises:
             InputError: the name does not suit a file name.
         """
-        if not re.fullmatch(r"\w[\w.-]*", name):
-            raise mistake("scene: name", "letters, digits, '_', '-' and '.'", repr(name))
+        if not re.fullmatch(NAME, name):
+            raise mistake("scene: name", NAME_EXPECTED, repr(name))
         self.name = name
         self.description = description
         self._here = f"scene {name}"
@@ -58,6 +61,7 @@ class SceneBuilder:
         self._front_path: Segment | None = None
         self._line: Segment | None = None
         self._collision_points: list[Vector] = []
+        self._gauges: list[Gauge] = []
         self._picture_times: tuple[float, ...] | None = None
         self._section: SectionPlane | None = None
 
@@ -218,6 +222,32 @@ class SceneBuilder:
         here = f"{self._here}: collision_point {len(self._collision_points) + 1}"
         self._collision_points.append(checks.vector(here, point))
 
+    def gauge(self, point: Sequence[float], *, name: str | None = None, moving: bool = False) -> None:
+        """Add a point where pressure, velocity and density are recorded at every step.
+
+        One that stays shows the field at its place, linear between the eight nodes around it: their field pressure,
+        their density (mass over the volume that the matter there takes), and the velocity of that mass. What passes
+        through a cell is seen smeared over about a cell; outside of matter all three are 0. One that moves shows its
+        particle's own pressure, density and velocity, and where it is; all but the place are 0 once the particle has
+        left through an open face. Both go into gauges.csv, what follows from them into summary.json.
+
+        Args:
+            point: where it is [m]; one that moves is carried by the particle that is nearest to it at the start.
+            name: for tables and pictures; without one "gauge_1", "gauge_2", ...
+            moving: whether it moves with the matter.
+
+        Raises:
+            InputError: not three finite numbers, or a name that is taken or does not suit the header of a table.
+        """
+        name = f"gauge_{len(self._gauges) + 1}" if name is None else name
+        here = f"{self._here}: gauge {name!r}"
+        if not isinstance(name, str) or not re.fullmatch(NAME, name):
+            raise mistake(f"{here}: name", NAME_EXPECTED, repr(name))
+        if any(gauge.name == name for gauge in self._gauges):
+            raise mistake(here, "a name of its own", "one that another gauge has")
+        checks.instance(f"{here}: moving", moving, bool, "True or False")
+        self._gauges.append(Gauge(name, checks.vector(f"{here}: point", point), moving))
+
     def picture_times(self, times: Iterable[float]) -> None:
         """Set the instants worth a picture [s]; without this they are six, equally spaced up to the end.
 
@@ -277,6 +307,7 @@ class SceneBuilder:
             line=self._line if self._line is not None else self._front_path,
             collision_points=tuple(self._collision_points),
             picture_times=pictures,
+            gauges=carried_gauges(self._here, self._gauges, domain, charges),
             warnings=tuple(
                 warning
                 for body, charge in zip(self._bodies, charges, strict=True)
@@ -299,6 +330,7 @@ class SceneBuilder:
     def _check_views(self, domain: Domain, end_time: float, section: SectionPlane) -> None:
         """Check that what is looked at lies in the domain and before the end."""
         points = {f"collision_point {n}": point for n, point in enumerate(self._collision_points, start=1)}
+        points |= {f"gauge {gauge.name!r}": gauge.position for gauge in self._gauges}
         for name, segment in (("front_path", self._front_path), ("line", self._line)):
             if segment is not None:
                 points |= {f"{name}: start": segment.start, f"{name}: end": segment.end}

@@ -87,6 +87,12 @@ def _parser() -> argparse.ArgumentParser:
     info.set_defaults(command=_info)
     info.add_argument("path", metavar="PATH", type=Path, help="a run directory or a USD file")
 
+    text = "Write the frames of a run, finished or killed, for other programs."
+    export = commands.add_parser("export", parents=[common], help="write a result for ParaView", description=text)
+    export.set_defaults(command=_export)
+    export.add_argument("path", metavar="RUN", type=Path, help="a run directory or a USD file")
+    export.add_argument("--to", metavar="FILE", type=Path, required=True, help="a .pvd file, or a directory for one")
+
     text = "Solve problems with exact answers: error tables, pictures, and exit code 1 when a bound is broken."
     check = commands.add_parser("verify", parents=[common], help="compare with exact solutions", description=text)
     check.set_defaults(command=_verify)
@@ -184,6 +190,18 @@ def _info(options: argparse.Namespace) -> None:
     from warp_mpm.output.info import describe
 
     print(describe(options.path))
+
+
+def _export(options: argparse.Namespace) -> None:
+    """Write a result for other programs, and print what to open.
+
+    Raises:
+        InputError: there is no such result, or no such format.
+        SimulationError: the disk is full or refuses.
+    """
+    from warp_mpm.output.export import export
+
+    print(export(options.path, options.to))
 
 
 def _verify(options: argparse.Namespace) -> None:

@@ -1,13 +1,24 @@
-"""The record of every step: peaks, the pressure around the front path and the collision points, and along the line.
+"""The record of every step: peaks, the pressure around front path and collision points and along the line, gauges.
 
 It is kept on the device and fetched in chunks, so that no step waits for the host.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import warp as wp
 
+from warp_mpm.kernels.gauges import (
+    GAUGE_DENSITY,
+    GAUGE_LANES,
+    GAUGE_POSITION,
+    GAUGE_PRESSURE,
+    GAUGE_VELOCITY,
+    NO_PARTICLE,
+    GaugePlaces,
+    record_gauges,
+)
 from warp_mpm.kernels.precision import scalar, vector3
 from warp_mpm.kernels.record import (
     RECORD_DT,
@@ -16,8 +27,8 @@ from warp_mpm.kernels.record import (
     RECORD_PARTICLE_PRESSURE,
     record_step,
 )
-from warp_mpm.output.frame import LineRecord
-from warp_mpm.scene import Domain, Segment, Vector
+from warp_mpm.output.frame import GaugeRecord, LineRecord
+from warp_mpm.scene import Domain, Scene, Segment, Vector
 from warp_mpm.state import State
 
 CHUNK = 512  # steps between two fetches
@@ -37,6 +48,7 @@ class StepRecord:
     point_pressures: np.ndarray  # (steps, points) highest within two cells of each collision point
     path: LineRecord | None  # along the front path
     line: LineRecord | None  # along the scene's line
+    gauges: Mapping[str, GaugeRecord] = field(default_factory=dict)  # by name
 
 
 class Recorder:
@@ -65,12 +77,18 @@ class Recorder:
             wp.array(_flat(scene.domain, cell).astype(np.int32), dtype=int, device=device),
             wp.array(fraction.astype(np.float32), dtype=vector3, device=device),
         ]
+        self._gauges = len(scene.gauges)
+        self._gauge_places = _gauge_places(scene, device)
+        self._first_gauge = RECORD_HEAD + self._regions + self._points
+        lanes = self._first_gauge + GAUGE_LANES * self._gauges
         self._times = wp.zeros(CHUNK, dtype=wp.float64, device=device)
-        self._rows = wp.zeros((CHUNK, RECORD_HEAD + self._regions + self._points), dtype=scalar, device=device)
+        self._rows = wp.zeros((CHUNK, lanes), dtype=scalar, device=device)
         self._fetched: list[tuple[np.ndarray, np.ndarray]] = []
         self._first_step = 0
         self._pending = 0
         self._peaks_taken = 0
+        self._gauges_taken = 0
+        self._sorts_seen = 0
 
     def record(self) -> None:
         """Record the state as it is now: once before the first step, then after each."""
@@ -78,6 +96,8 @@ class Recorder:
             self._fetch()
         inputs = [*self._inputs, self._times, self._rows, self._first_step]
         wp.launch(record_step, 1 + self._regions + self._points, inputs=inputs, device=self._state.device)
+        if self._gauges:
+            self._record_gauges()
         self._pending += 1
 
     def take_peak(self) -> float:
@@ -87,6 +107,19 @@ class Recorder:
         self._peaks_taken = len(self._fetched)
         return peak
 
+    def take_gauges(self) -> tuple[np.ndarray, np.ndarray]:
+        """What the gauges showed since this was last asked.
+
+        Returns:
+            Times (steps,) float64 [s], and (steps, gauges, 8) float32: pressure [Pa], velocity [m/s], density [kg/m3],
+            position [m].
+        """
+        self._fetch()
+        fetched = self._fetched[self._gauges_taken :]
+        self._gauges_taken = len(self._fetched)
+        rows = np.concatenate([np.empty((0, self._rows.shape[1]), np.float32), *(rows for _, rows in fetched)])
+        return np.concatenate([np.empty(0), *(time for time, _ in fetched)]), self._gauge_lanes(rows)
+
     def result(self) -> StepRecord:
         """Everything recorded so far."""
         self._fetch()
@@ -95,7 +128,8 @@ class Recorder:
         has_path = self._scene.front_path is not None
         first_point = RECORD_HEAD + self._regions
         on_path = rows[:, first_point : first_point + len(self._path_points)]
-        on_line = rows[:, first_point + len(self._path_points) :]
+        on_line = rows[:, first_point + len(self._path_points) : self._first_gauge]
+        on_gauges = self._gauge_lanes(rows)
         return StepRecord(
             time=time,
             dt=rows[:, RECORD_DT],
@@ -105,7 +139,32 @@ class Recorder:
             point_pressures=rows[:, RECORD_HEAD + int(has_path) : first_point],
             path=_line_record(time, self._path_points, on_path),
             line=_line_record(time, self._line_points, on_line),
+            gauges={
+                gauge.name: _gauge_record(time, on_gauges[:, number]) for number, gauge in enumerate(self._scene.gauges)
+            },
         )
+
+    def _record_gauges(self) -> None:
+        """Write what the gauges show into the present row; first find particles that a sorting has moved in memory."""
+        state = self._state
+        if self._sorts_seen != state.sorts:
+            self._gauge_places.particle.assign(self._carriers())
+            self._sorts_seen = state.sorts
+        inputs = [state.grid, state.particles, state.clock, self._gauge_places]
+        inputs += [self._first_gauge, self._rows, self._first_step]
+        wp.launch(record_gauges, self._gauges, inputs=inputs, device=state.device)
+
+    def _carriers(self) -> np.ndarray:
+        """Where in memory the particle of each gauge is, (gauges,); `NO_PARTICLE` for those that stay."""
+        gauges = self._scene.gauges
+        carriers = np.array([NO_PARTICLE if gauge.particle is None else gauge.particle for gauge in gauges], np.int32)
+        moving = carriers != NO_PARTICLE
+        carriers[moving] = self._state.places_in_memory(carriers[moving])
+        return carriers
+
+    def _gauge_lanes(self, rows: np.ndarray) -> np.ndarray:
+        """The gauges' part of rows, (steps, gauges, 8)."""
+        return rows[:, self._first_gauge :].reshape(len(rows), self._gauges, GAUGE_LANES)
 
     def _fetch(self) -> None:
         if self._pending:
@@ -153,6 +212,30 @@ def _flat(domain: Domain, nodes: np.ndarray) -> np.ndarray:
     """Flat index of nodes (n, 3), as `kernels.records.node_index` counts."""
     count_y, count_z = domain.cells[1] + 3, domain.cells[2] + 3
     return ((nodes[:, 0] + 1) * count_y + nodes[:, 1] + 1) * count_z + nodes[:, 2] + 1
+
+
+def _gauge_places(scene: Scene, device: wp.Device) -> GaugePlaces:
+    """Where the scene's gauges are, as the kernels take it."""
+    points = np.array([gauge.position for gauge in scene.gauges]).reshape(-1, 3)
+    cell, fraction = _cells_of(scene.domain, points)
+    places = GaugePlaces()
+    places.cell = wp.array(cell.astype(np.int32), dtype=wp.vec3i, device=device)
+    places.fraction = wp.array(fraction.astype(np.float32), dtype=vector3, device=device)
+    places.particle = wp.zeros(len(points), dtype=int, device=device)
+    places.lower = wp.vec3d(*scene.domain.lower)
+    places.spacing = wp.vec3d(*scene.domain.spacing)
+    return places
+
+
+def _gauge_record(time: np.ndarray, lanes: np.ndarray) -> GaugeRecord:
+    """The record of a gauge from its lanes (steps, 8)."""
+    return GaugeRecord(
+        time=time,
+        pressure=lanes[:, GAUGE_PRESSURE],
+        velocity=lanes[:, GAUGE_VELOCITY : GAUGE_VELOCITY + 3],
+        density=lanes[:, GAUGE_DENSITY],
+        position=lanes[:, GAUGE_POSITION : GAUGE_POSITION + 3],
+    )
 
 
 def _line_record(time: np.ndarray, points: np.ndarray, pressure: np.ndarray) -> LineRecord | None:

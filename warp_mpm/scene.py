@@ -123,6 +123,16 @@ class Segment:
 
 
 @dataclass(frozen=True)
+class Gauge:
+    """A point where pressure, velocity and density are recorded at every step (see `SceneBuilder.gauge`)."""
+
+    name: str
+    position: Vector  # [m]; of a moving one, the point where its particle was looked for
+    moving: bool = False
+    particle: int | None = None  # that a moving one is carried by, in creation order
+
+
+@dataclass(frozen=True)
 class SectionPlane:
     """A plane normal to an axis on which the field pressure is shown."""
 
@@ -156,6 +166,7 @@ class Scene:
     line: Segment | None = None  # along which pressure is recorded at every step
     collision_points: tuple[Vector, ...] = ()  # where fronts are expected to meet [m]
     picture_times: tuple[float, ...] = ()  # instants worth a picture [s]
+    gauges: tuple[Gauge, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property

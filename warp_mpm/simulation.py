@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, fields
 from enum import Enum
@@ -207,7 +207,7 @@ class _Run:
         if self.output is None:
             yield lambda *_: None
             return
-        from warp_mpm.output.tables import HistoryWriter
+        from warp_mpm.output.tables import TableWriter
         from warp_mpm.output.usd import UsdWriter
 
         with ExitStack() as stack:
@@ -220,16 +220,34 @@ class _Run:
                     fields=self.save.fields,
                 )
             )
-            history: list[HistoryWriter] = []
+            write_gauges = self._gauge_writer(self.output / "gauges.csv", stack)
+            history: list[TableWriter] = []
 
             def write(index: int, now: float, pressure: np.ndarray, inside: np.ndarray, row: dict[str, float]) -> None:
                 if not history:
                     path = self.output / "history.csv" if self.output else Path()
-                    history.append(stack.enter_context(HistoryWriter(path, list(row))))
+                    history.append(stack.enter_context(TableWriter(path, list(row))))
                 history[0].write(row)
+                write_gauges()
                 usd.write(self._frame(index, now, pressure, inside))
 
             yield write
+
+    def _gauge_writer(self, path: Path, stack: ExitStack) -> Callable[[], None]:
+        """A function that adds to gauges.csv what was recorded since it was last called, as does the end of `stack`."""
+        from warp_mpm.output.tables import TableWriter, gauge_columns, gauge_rows
+
+        gauges = self.scene.gauges
+        if not gauges:
+            path.unlink(missing_ok=True)  # what an earlier run left
+            return lambda: None
+        table = stack.enter_context(TableWriter(path, gauge_columns(gauges)))
+
+        def write() -> None:
+            table.extend(gauge_rows(gauges, *self.recorder.take_gauges()))
+
+        stack.callback(write)
+        return write
 
     def _frame(self, index: int, now: float, pressure: np.ndarray, inside: np.ndarray) -> Frame:
         sources = {"particleVelocity": "velocity"}

@@ -69,6 +69,7 @@ class State:
         self._keys = wp.zeros(2 * self.count, dtype=wp.int64, device=self.device)
         self._order = wp.zeros(2 * self.count, dtype=int, device=self.device)
         self._light()
+        self.sorts = 0
         self.ranges = self.sort()
 
     def sort(self) -> np.ndarray:
@@ -78,6 +79,7 @@ class State:
             (slabs, charges, 2) first particle and number of particles of each group.
         """
         model, n = self.model, self.count
+        self.sorts += 1
         wp.launch(
             order.sort_keys,
             n,
@@ -126,6 +128,13 @@ class State:
         result = np.empty_like(values)
         result[self.particles.index.numpy()] = values
         return result
+
+    def places_in_memory(self, particles: np.ndarray) -> np.ndarray:
+        """Where particles (n,), given by their creation order, are in memory, (n,); until the next sorting."""
+        index = self.particles.index.numpy()
+        places = np.flatnonzero(np.isin(index, particles))
+        rising = np.argsort(index[places])
+        return places[rising][np.searchsorted(index[places], particles, sorter=rising)]
 
     def field(self, name: str) -> np.ndarray:
         """A quantity of all particles (see `kernels/records.py`), in creation order."""

@@ -150,6 +150,28 @@ def gauge_pressure(scene: Scene, record: StepRecord, material: Material) -> floa
     return float(np.median(record.path.pressure[before][:, used].max(axis=0)))
 
 
+def gauge_figures(record: StepRecord, material: Material | None) -> dict[str, dict[str, float | None]]:
+    """By gauge: when the front arrived, the highest pressure and its time, and the impulse, the integral of p dt.
+
+    The front has arrived when the pressure reaches 0.05 p_CJ, as along the front path; None if it never did, or without
+    an explosive.
+    """
+    state = material.cj if material is not None else None
+    figures: dict[str, dict[str, float | None]] = {}
+    for name, gauge in record.gauges.items():
+        line = LineRecord(gauge.time, np.zeros(1), gauge.pressure[:, None])
+        arrival = float(arrival_times(line, ARRIVAL_SHARE * state.pressure)[0]) if state else np.nan
+        highest = int(np.argmax(gauge.pressure))
+        mean = 0.5 * (gauge.pressure[1:].astype(np.float64) + gauge.pressure[:-1])
+        figures[name] = {
+            "arrival_time_s": arrival if np.isfinite(arrival) else None,
+            "peak_pressure_pa": float(gauge.pressure[highest]),
+            "peak_time_s": float(gauge.time[highest]),
+            "impulse_pa_s": float(mean @ np.diff(gauge.time)),
+        }
+    return figures
+
+
 def figures_of_merit(scene: Scene, record: StepRecord) -> dict[str, object]:
     """The keys of summary.json that compare the run with theory; None where they do not apply."""
     material = lit_explosive(scene)
@@ -169,4 +191,5 @@ def figures_of_merit(scene: Scene, record: StepRecord) -> dict[str, object]:
         "collision_positions_m": meeting_points(scene, record, material) if material is not None else [],
         "peak_pressure_pa": float(record.field_pressure.max()),
         "max_particle_pressure_pa": float(record.particle_pressure.max()),
+        "gauges": gauge_figures(record, material),
     }

@@ -27,6 +27,17 @@ class SectionPicture:
 
 
 @dataclass(frozen=True)
+class GaugeRecord:
+    """What a gauge showed at every step (see `SceneBuilder.gauge`)."""
+
+    time: np.ndarray  # (steps,) float64 [s]
+    pressure: np.ndarray  # (steps,) float32 [Pa]
+    velocity: np.ndarray  # (steps, 3) float32 [m/s]
+    density: np.ndarray  # (steps,) float32 [kg/m3]
+    position: np.ndarray  # (steps, 3) float32 [m]
+
+
+@dataclass(frozen=True)
 class LineRecord:
     """The field pressure along the scene's line at every step."""
 

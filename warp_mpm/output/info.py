@@ -1,26 +1,30 @@
 """Says what a run directory or a USD file holds."""
 
+import csv
 import io
 import json
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom
+from pxr import Usd, UsdGeom
 from rich.console import Console
 
 from warp_mpm.errors import InputError
-from warp_mpm.output.tables import print_summary
+from warp_mpm.output.tables import GAUGE_COLUMNS, print_summary
+from warp_mpm.output.usd_reading import frame_times, open_stage, usd_file, usd_files
 
 MICROSECOND = 1e-6  # [s]
-USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+COMPLETE = "complete"  # status of a run that came to its end
+GAUGE_MARK = f"_{GAUGE_COLUMNS[0]}"  # ends one column of every gauge
 WIDTH = 100  # of the text, in characters
 
 
 def describe(path: str | Path) -> str:
-    """Describe a run directory (its figures, files and frames) or a USD file (its prims, frames, fields and ranges).
+    """Describe a run directory (its figures, files, frames and fields) or a USD file (its prims, frames and fields).
 
     Raises:
         InputError: there is no such file, or it is neither, or it is damaged.
@@ -28,14 +32,13 @@ def describe(path: str | Path) -> str:
     path = Path(path)
     if path.is_dir():
         return _describe_run(path)
-    if not path.exists():
-        raise InputError(f"info: expected a run directory or a USD file, got {str(path)!r}, which does not exist")
-    return "\n".join([f"{path.name}  {_size(path)}", *_usd_lines(_open(path))])
+    file = usd_file("info", path)
+    return "\n".join([f"{file.name}  {_size(file)}", *_usd_lines(open_stage("info", file))])
 
 
 def _describe_run(directory: Path) -> str:
     summary = directory / "summary.json"
-    stages = [file for file in sorted(directory.iterdir()) if file.suffix in USD_SUFFIXES]
+    stages = usd_files(directory)
     if not summary.exists() and not stages:
         raise InputError(
             f"info: expected a run directory with summary.json or a USD file, got {str(directory)!r}, which has neither"
@@ -43,8 +46,12 @@ def _describe_run(directory: Path) -> str:
     parts = [_summary_text(summary) if summary.exists() else f"{directory}: no summary.json, the run did not end"]
     files = [file for file in sorted(directory.rglob("*")) if file.is_file() and file.parent.name != "clips"]
     width = max(len(str(file.relative_to(directory))) for file in files)
-    parts.append("\n".join(f"{file.relative_to(directory)!s:{width}}  {_size(file):>9}" for file in files))
-    parts += [f"{stage.name}: {_time_line(_open(stage))}" for stage in stages]
+    lines = (f"{file.relative_to(directory)!s:{width}}  {_size(file):>9}  {_table_note(file)}" for file in files)
+    parts.append("\n".join(line.rstrip() for line in lines))
+    for file in stages[:1]:  # further ones, such as a package, hold the same
+        stage = open_stage("info", file)
+        shapes = (prim for prim in stage.Traverse() if prim.IsA(UsdGeom.PointBased))
+        parts.append("\n".join([f"{file.name}: {_time_line(stage)}", *_prim_lines(shapes)]))
     return "\n\n".join(parts)
 
 
@@ -55,32 +62,24 @@ def _summary_text(path: Path) -> str:
         raise InputError(f"info: {path}: expected JSON, got something else ({error}); run the scene again") from error
     text = io.StringIO()
     print_summary(summary, Console(file=text, width=WIDTH))
-    return text.getvalue().rstrip()
+    status = summary.get("status", COMPLETE)
+    ended = "" if status == COMPLETE else f"\nthe run did not come to its end: {status}"
+    return text.getvalue().rstrip() + ended
 
 
-def _open(path: Path) -> Any:
-    """The stage in a USD file.
-
-    Raises:
-        InputError: it is not USD, or truncated, or a layer it needs is missing.
-    """
-    try:
-        stage = Usd.Stage.Open(str(path))
-    except Tf.ErrorException as error:
-        raise InputError(f"info: {path}: expected a whole USD file, got one that does not open{_why(error)}") from error
-    problems = stage.GetCompositionErrors()
-    if problems:
-        raise InputError(f"info: {path}: expected a whole USD stage, got one with a missing layer; {problems[0]}")
-    return stage
-
-
-def _why(error: Exception) -> str:
-    text = str(error)
-    if "truncated" in text:
-        return ": it is corrupt, possibly truncated"
-    if "Cannot determine file format" in text:
-        return ": its format is unknown"
-    return ""
+def _table_note(file: Path) -> str:
+    """Rows of a table of a run, the times they span, and the gauges that have columns in it."""
+    if file.suffix != ".csv":
+        return ""
+    with file.open(newline="", encoding="utf-8") as lines:
+        header, *rows = [*csv.reader(lines)] or [[]]
+    rows = [row for row in rows if len(row) == len(header)]  # a killed run may have left part of one
+    if header[:1] != ["time_s"] or not rows:
+        return f"{len(rows)} rows"
+    first, last = (float(row[0]) / MICROSECOND for row in (rows[0], rows[-1]))
+    gauges = [name.removesuffix(GAUGE_MARK) for name in header if name.endswith(GAUGE_MARK)]
+    named = f": {', '.join(gauges)}" if file.name == "gauges.csv" else ""
+    return f"{len(rows)} rows, {first:.1f} to {last:.1f} µs{named}"
 
 
 def _usd_lines(stage: Any) -> Iterator[str]:
@@ -93,7 +92,12 @@ def _usd_lines(stage: Any) -> Iterator[str]:
     yield f"  {_time_line(stage)}"
     for key, value in sorted(stage.GetRootLayer().customLayerData.items()):
         yield f"  {key}: {value}"
-    for prim in stage.Traverse():
+    yield from _prim_lines(stage.Traverse())
+
+
+def _prim_lines(prims: Iterable[Any]) -> Iterator[str]:
+    """A line for each prim and each of its fields."""
+    for prim in prims:
         yield f"{prim.GetPath()}  {prim.GetTypeName()}{_prim_note(prim)}"
         for primvar in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues():
             yield f"    {primvar.GetPrimvarName():18} {_primvar_note(primvar)}"
@@ -101,12 +105,11 @@ def _usd_lines(stage: Any) -> Iterator[str]:
 
 def _time_line(stage: Any) -> str:
     """Number of frames and their times."""
-    prim = stage.GetDefaultPrim()
-    codes = prim.GetAttribute("blast:time").GetTimeSamples() if prim and prim.HasAttribute("blast:time") else []
-    if not codes:
+    times = frame_times(stage)
+    if not times:
         return f"time codes {stage.GetStartTimeCode():g} to {stage.GetEndTimeCode():g}"
-    first, last = (prim.GetAttribute("blast:time").Get(code) / MICROSECOND for code in (codes[0], codes[-1]))
-    return f"{len(codes)} frames, time codes {codes[0]:g} to {codes[-1]:g}, {first:.1f} to {last:.1f} µs"
+    first, last = times[0] / MICROSECOND, times[-1] / MICROSECOND
+    return f"{len(times)} frames, time codes 0 to {len(times) - 1}, {first:.1f} to {last:.1f} µs"
 
 
 def _prim_note(prim: Any) -> str:
@@ -116,8 +119,10 @@ def _prim_note(prim: Any) -> str:
         x, y, z = UsdGeom.Xformable(prim).GetLocalTransformation().ExtractTranslation()
         return f"  at ({x:g}, {y:g}, {z:g}) m, lit at {ignition.Get() / MICROSECOND:g} µs"
     if prim.IsA(UsdGeom.PointBased):
-        points = UsdGeom.PointBased(prim).GetPointsAttr().Get(Usd.TimeCode.EarliestTime())
-        return f"  {len(points or ()):,} points"
+        points = UsdGeom.PointBased(prim).GetPointsAttr()
+        changing = prim.IsA(UsdGeom.Mesh) and points.GetTimeSamples()
+        counts = {len(points.Get(code) or ()) for code in changing or [Usd.TimeCode.EarliestTime()]}
+        return f"  {' to '.join(f'{count:,}' for count in sorted({min(counts), max(counts)}))} points"
     return ""
 
 
@@ -132,7 +137,8 @@ def _primvar_note(primvar: Any) -> str:
     if attribute.GetRoleName():
         return f"{kind}, {len(samples)} samples"
     lower, upper = _range(attribute, samples or [Usd.TimeCode.Default()])
-    span = f", {lower:.4g} to {upper:.4g}" if lower <= upper else ""
+    unit = re.search(r"\[([^]]*)\]$", attribute.GetDocumentation())
+    span = f", {lower:.4g} to {upper:.4g} {unit.group(1) if unit else ''}".rstrip() if lower <= upper else ""
     return f"{kind}, {len(samples)} samples{span}"
 
 

@@ -1,9 +1,10 @@
-"""The numbers of a run: history.csv row by row, summary.json, and the table that a person reads at the end."""
+"""The numbers of a run: history.csv, gauges.csv, summary.json, and the tables that a person reads at the end."""
 
 import csv
+import io
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
@@ -15,15 +16,27 @@ from rich.console import Console
 from rich.table import Table
 
 from warp_mpm.output.whole_file import whole_file, write_error
+from warp_mpm.scene import Gauge
 
 COLLISION_RATIO = 2.443  # pressure at the contact of two plane CJ fronts, head-on, over p_CJ, for gamma = 2
 GIGAPASCAL = 1e9  # [Pa]
+KILOPASCAL = 1e3  # [Pa]
 MICROSECOND = 1e-6  # [s]
 DASH = "–"
 
 
-class HistoryWriter:
-    """history.csv in the making; each row is on disk when `write` returns."""
+# Columns of a gauge, after its name, in the order of its lanes in the record; the last three of moving ones alone.
+GAUGE_COLUMNS = (
+    "pressure_pa",
+    *(f"velocity_{axis}_m_s" for axis in "xyz"),
+    "density_kg_m3",
+    *(f"{axis}_m" for axis in "xyz"),
+)
+PLACE_COLUMNS = 3
+
+
+class TableWriter:
+    """A CSV file in the making; rows are on disk when `write` or `extend` returns."""
 
     def __init__(self, path: str | Path, columns: Sequence[str]) -> None:
         """Start the file with its header.
@@ -37,10 +50,9 @@ class HistoryWriter:
             self._file = self._path.open("w", newline="", encoding="utf-8")
         except OSError as error:
             raise write_error(self._path, error) from error
-        self._rows = csv.writer(self._file, lineterminator="\n")
-        self._append(self._columns)
+        self.extend([self._columns])
 
-    def __enter__(self) -> "HistoryWriter":
+    def __enter__(self) -> "TableWriter":
         """The writer itself."""
         return self
 
@@ -56,18 +68,45 @@ class HistoryWriter:
             SimulationError: the disk is full or refuses.
         """
         values = [_plain(row[name]) for name in self._columns]
-        self._append(["" if value is None else value for value in values])
+        self.extend([["" if value is None else value for value in values]])
+
+    def extend(self, rows: Iterable[Sequence[Any]]) -> None:
+        """Add rows whose values are in the order of the columns, and are written as they are.
+
+        Raises:
+            SimulationError: the disk is full or refuses.
+        """
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        try:
+            self._file.write(text.getvalue())
+            self._file.flush()
+        except OSError as error:
+            raise write_error(self._path, error) from error
 
     def close(self) -> None:
         """Close the file. May be called twice."""
         self._file.close()
 
-    def _append(self, values: Sequence[Any]) -> None:
-        try:
-            self._rows.writerow(values)
-            self._file.flush()
-        except OSError as error:
-            raise write_error(self._path, error) from error
+
+def gauge_columns(gauges: Sequence[Gauge]) -> list[str]:
+    """The header of gauges.csv: the time, and for each gauge its name with what was recorded."""
+    names = np.array([[f"{gauge.name}_{column}" for column in GAUGE_COLUMNS] for gauge in gauges])
+    return ["time_s", *names[_written(gauges)]]
+
+
+def gauge_rows(gauges: Sequence[Gauge], time: np.ndarray, values: np.ndarray) -> Iterator[list[str]]:
+    """Rows of gauges.csv from times (steps,) [s] and values (steps, gauges, 8); numbers read back exactly."""
+    table = values[:, _written(gauges)]
+    for now, row in zip(time.astype(str), np.where(np.isfinite(table), table.astype(str), ""), strict=True):
+        yield [now, *row]
+
+
+def _written(gauges: Sequence[Gauge]) -> np.ndarray:
+    """Which lanes of which gauges (gauges, 8) are written."""
+    written = np.ones((len(gauges), len(GAUGE_COLUMNS)), dtype=bool)
+    written[[not gauge.moving for gauge in gauges], -PLACE_COLUMNS:] = False
+    return written
 
 
 def write_summary(path: str | Path, summary: Mapping[str, Any]) -> None:
@@ -90,6 +129,8 @@ def print_summary(summary: Mapping[str, Any], console: Console | None = None) ->
     """
     console = console or Console()
     console.print(theory_table(summary))
+    if summary.get("gauges"):
+        console.print(gauge_table(summary["gauges"]))
     console.print(_errors(summary), highlight=False, markup=False, soft_wrap=True)
     console.print(_cost(summary), highlight=False, markup=False, soft_wrap=True)
     for warning in summary.get("warnings") or ():
@@ -123,6 +164,24 @@ def theory_table(summary: Mapping[str, Any]) -> Table:
     return table
 
 
+def gauge_table(gauges: Mapping[str, Mapping[str, float | None]]) -> Table:
+    """What the gauges saw, a row each."""
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("gauge")
+    for heading in ("arrival", "peak pressure", "at", "impulse"):
+        table.add_column(heading, justify="right")
+    for name, figures in gauges.items():
+        impulse = figures.get("impulse_pa_s")
+        table.add_row(
+            name,
+            _time(figures.get("arrival_time_s")),
+            _pressure(figures.get("peak_pressure_pa")),
+            _time(figures.get("peak_time_s")),
+            DASH if impulse is None else f"{impulse / KILOPASCAL:.1f} kPa s",
+        )
+    return table
+
+
 def _errors(summary: Mapping[str, Any]) -> str:
     """One line with the relative errors of the conserved quantities."""
     errors = (f"{name} {_error(summary.get(f'{name}_error'))}" for name in ("mass", "momentum", "energy"))
@@ -131,8 +190,7 @@ def _errors(summary: Mapping[str, Any]) -> str:
 
 def _cost(summary: Mapping[str, Any]) -> str:
     """What was computed, how long it took, and on what."""
-    end = summary.get("end_time_s")
-    time = DASH if end is None else f"{end / MICROSECOND:.1f} µs"
+    time = _time(summary.get("end_time_s"))
     size = f"{_count(summary.get('particles'))} particles, {_count(summary.get('steps'))} steps to {time}"
     wall, speed = summary.get("wall_s"), summary.get("ns_per_particle_step")
     seconds = DASH if wall is None else f"{wall:.1f} s"
@@ -142,6 +200,10 @@ def _cost(summary: Mapping[str, Any]) -> str:
 
 def _pressure(value: float | None) -> str:
     return DASH if value is None else f"{value / GIGAPASCAL:.3f} GPa"
+
+
+def _time(value: float | None) -> str:
+    return DASH if value is None else f"{value / MICROSECOND:.1f} µs"
 
 
 def _speed(value: float | None) -> str:

@@ -1,0 +1,73 @@
+"""Opens what a run left as USD, whole or killed, and says which frames are in it."""
+
+from pathlib import Path
+from typing import Any
+
+from pxr import Tf, Usd
+
+from warp_mpm.checks import mistake
+from warp_mpm.errors import InputError
+
+SUFFIXES = (".usdc", ".usda", ".usdz", ".usd")  # in the order in which they are looked for
+
+
+def usd_files(directory: Path) -> list[Path]:
+    """The whole USD files of a directory, a merged one first; not what a killed run left half written."""
+    files = [file for suffix in SUFFIXES for file in sorted(directory.glob(f"*{suffix}"))]
+    return [file for file in files if not file.stem.endswith(".part")]
+
+
+def usd_file(where: str, path: Path) -> Path:
+    """The USD file at a path: that file, or that of a run directory.
+
+    Args:
+        where: the beginning of error messages.
+        path: a USD file or a run directory.
+
+    Raises:
+        InputError: there is neither.
+    """
+    if path.is_dir():
+        files = usd_files(path)
+        if not files:
+            raise mistake(where, "a run directory with a USD file", f"{str(path)!r}, which has none")
+        return files[0]
+    if not path.exists():
+        raise mistake(where, "a run directory or a USD file", f"{str(path)!r}, which does not exist")
+    return path
+
+
+def open_stage(where: str, path: Path) -> Any:
+    """The stage in a USD file.
+
+    Raises:
+        InputError: it is not USD, or truncated, or a layer it needs is missing.
+    """
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        raise InputError(
+            f"{where}: {path}: expected a whole USD file, got one that does not open{_why(error)}"
+        ) from error
+    problems = stage.GetCompositionErrors()
+    if problems:
+        raise InputError(f"{where}: {path}: expected a whole USD stage, got one with a missing layer; {problems[0]}")
+    return stage
+
+
+def frame_times(stage: Any) -> list[float]:
+    """Physical time of every frame [s]; time codes count the frames. Empty if the stage is not that of a run."""
+    prim = stage.GetDefaultPrim()
+    time = prim.GetAttribute("blast:time") if prim else None
+    if not time or not time.HasValue() or not time.GetTimeSamples():
+        return []
+    return [time.Get(code) for code in range(round(stage.GetEndTimeCode()) + 1)]
+
+
+def _why(error: Exception) -> str:
+    text = str(error)
+    if "truncated" in text:
+        return ": it is corrupt, possibly truncated"
+    if "Cannot determine file format" in text:
+        return ": its format is unknown"
+    return ""
