@@ -87,7 +87,7 @@ def record_gauges(
                     n = node_index(grid, index[0], index[1], index[2])
                     w = wp.abs(scalar(1 - i) - f[0]) * wp.abs(scalar(1 - j) - f[1]) * wp.abs(scalar(1 - k) - f[2])
                     mass = w * node_density(grid, index)
-                    pressure += w * grid.pressure[n]
+                    pressure += w * grid.field[n][0]
                     density += mass
                     velocity += mass * first_three(grid.node[n])
         velocity *= wp.where(density > ZERO, ONE / density, ZERO)

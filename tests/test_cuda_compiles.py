@@ -18,7 +18,7 @@ KERNELS = {
     ),
     "clear": grid.clear_kernel,
     "solve": lambda: grid.solve_kernel(True, True, True),
-    "solve_reprojected": lambda: grid.solve_reprojected_kernel(True),
+    "solve_reprojected": lambda: grid.solve_reprojected_kernel(True, True),
     "sharpen_acceleration": sharpen.sharpen_acceleration_kernel,
     "sharpen_velocity": sharpen.sharpen_velocity_kernel,
     "start_step": lambda: reduce.start_step,

@@ -103,7 +103,8 @@ def test_fields_between_nodes(device, sheared):
     values[(*inside, slice(0, 3))] = nodes @ velocities + [100.0, 0.0, -50.0]
     values[(*inside, 3)] = linear(nodes, 1000.0, densities) * CELL**3 * share
     values[(*inside, 7)] = 1.0
-    solver.state.grid.pressure.assign(np.append(pressure.ravel(), 0.0).astype(np.float32))
+    field = np.stack([pressure.ravel(), np.zeros(pressure.size)], axis=1)
+    solver.state.grid.field.assign(np.append(field, [[0.0, 0.0]], axis=0).astype(np.float32))
     solver.state.grid.node.assign(values.reshape(-1, 8).astype(np.float32))
     recorder.record()
     gauges = recorder.result().gauges.values()
