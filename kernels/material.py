@@ -17,7 +17,14 @@ from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
 from warp_mpm.kernels.transfer import look_ahead_function
 from warp_mpm.kernels.vectors import at_rest_if_slow
-from warp_mpm.kernels.viscosity import Viscosity, closing_rate, directedness, viscous_pressure, viscous_rate
+from warp_mpm.kernels.viscosity import (
+    Viscosity,
+    closing_rate,
+    directedness,
+    viscous_length,
+    viscous_pressure,
+    viscous_rate,
+)
 
 # Where a wave arrives, whether a particle burns already is a matter of round-off: what a switch would turn into a jump
 # sets in over a short part of the burn instead, so that mirror images stay mirror images.
@@ -77,7 +84,8 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
             axis = directedness(viscosity, result.sound_speed, divergence) * direction
             share = wp.dot(axis, axis)
             result.closing_rate = closing_rate(share, closing, divergence)
-            q = viscous_pressure(viscosity, density, result.sound_speed, result.closing_rate)
+            length = viscous_length(viscosity, axis)
+            q = viscous_pressure(viscosity, length, density, result.sound_speed, result.closing_rate)
             q *= wp.min(burnt * PER_IGNITED, ONE)
             result.viscous_pressure = q * (ONE - share)
             result.viscous_thrust = wp.sqrt(q) * axis

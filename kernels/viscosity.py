@@ -5,10 +5,12 @@ heated for that. M. L. Wilkins (J. Comput. Phys. 36, 281, 1980) therefore takes 
 which is the shock's normal. Here the viscosity is a pressure tensor
 
     Q (b b^T + (1 - |b|^2) I),    d = b . (grad v) . b + (1 - |b|^2) div v,    Q = rho l (c_Q l d^2 - c_L c d) if d < 0,
+    1 / l^2 = sum b_i^2 / h_i^2 + (1 - |b|^2) / (hx hy hz)^(2/3),
 
 with b along the acceleration: nearly a unit vector where the compression is strong, |b|^2 = x^2 / (x^2 + x0^2) with
 x = (l div v)^2 and x0 = (0.2 c)^2, and small where it is weak, so that noise has no say in the direction. Along one
-axis it is the scalar viscosity, whatever |b| is.
+axis it is the scalar viscosity, whatever |b| is. Its length l is that of the cell along b, so that a shock is as many
+cells wide along every axis of cells that are no cubes.
 """
 
 import warp as wp
@@ -21,12 +23,13 @@ TINY = wp.constant(scalar(1.0e-30))  # keeps rest from being divided by
 
 @wp.struct
 class Viscosity:
-    """Coefficients and length of the artificial viscosity."""
+    """Coefficients and lengths of the artificial viscosity."""
 
     quadratic: scalar  # c_Q
     linear: scalar  # c_L
-    length: scalar  # l = (hx hy hz)^(1/3) [m]
+    length: scalar  # (hx hy hz)^(1/3) [m], l without a direction
     inverse_length: scalar  # [1/m]
+    inverse_spacing: vector3  # 1 / h_i [1/m]
 
 
 @wp.func
@@ -57,11 +60,21 @@ def closing_rate(share: scalar, along: scalar, divergence: scalar) -> scalar:
 
 
 @wp.func
-def viscous_pressure(viscosity: Viscosity, density: scalar, sound_speed: scalar, rate: scalar) -> scalar:
+def viscous_length(viscosity: Viscosity, axis: vector3) -> scalar:
+    """l [m] for the axis b."""
+    along = wp.cw_mul(axis, viscosity.inverse_spacing)
+    rest = (ONE - wp.dot(axis, axis)) * viscosity.inverse_length * viscosity.inverse_length
+    return ONE / wp.sqrt(wp.dot(along, along) + rest)
+
+
+@wp.func
+def viscous_pressure(
+    viscosity: Viscosity, length: scalar, density: scalar, sound_speed: scalar, rate: scalar
+) -> scalar:
     """Q = rho l (c_Q l d^2 - c_L c d) [Pa] for a closing rate d < 0, else 0."""
     compression = wp.min(rate, ZERO)
-    quadratic = viscosity.quadratic * viscosity.length * compression * compression
-    return density * viscosity.length * (quadratic - viscosity.linear * sound_speed * compression)
+    quadratic = viscosity.quadratic * length * compression * compression
+    return density * length * (quadratic - viscosity.linear * sound_speed * compression)
 
 
 @wp.func

@@ -186,7 +186,7 @@ def viscosity_kernel(
     rows: wp.array2d(dtype=scalar),
 ):
     n = wp.tid()
-    rows[n, 0] = viscous_pressure(viscosity, density, sound, divergences[n])
+    rows[n, 0] = viscous_pressure(viscosity, viscosity.length, density, sound, divergences[n])
     rows[n, 1] = viscous_rate(viscosity, sound, divergences[n])
 
 

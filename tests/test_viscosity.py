@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 
 from warp_mpm.kernels.precision import matrix3, scalar, vector3
-from warp_mpm.kernels.viscosity import Viscosity, closing_rate, directedness, unit_vector
+from warp_mpm.kernels.viscosity import Viscosity, closing_rate, directedness, unit_vector, viscous_length
 
 ROUND_OFF = float(np.finfo(np.float32).eps)
 LENGTH, SOUND = 0.01, 1000.0  # [m], [m/s]
@@ -89,6 +89,32 @@ def test_gas_that_converges_evenly_is_left_alone(dimensions, device):
     axis, rate = axis_and_rate(5.0 * place, -STRONG * across, device)
     np.testing.assert_allclose(axis, place, rtol=1e-4)
     assert abs(rate) < 1e-4 * STRONG
+
+
+@wp.kernel(enable_backward=False)
+def length_kernel(viscosity: Viscosity, axes: wp.array(dtype=vector3), lengths: wp.array(dtype=scalar)):
+    n = wp.tid()
+    lengths[n] = viscous_length(viscosity, axes[n])
+
+
+def test_its_length_is_that_of_the_cell_along_the_axis(device):
+    """1 / l^2 = sum b_i^2 / h_i^2 + (1 - |b|^2) / (hx hy hz)^(2/3): a cell's edge along its axes, the mean of all edges
+    without a direction; in cubes the edge for every b.
+    """
+    spacing = np.array([1e-3, 2e-3, 1.5e-3])
+    mean = np.cbrt(np.prod(spacing))
+    slanting = np.array([0.48, 0.6, 0.64])
+    axes = np.array([*np.eye(3), np.zeros(3), slanting, 0.5 * slanting])
+    expected = [*spacing, mean, np.linalg.norm(slanting / spacing) ** -1.0]
+    expected.append((0.25 * np.linalg.norm(slanting / spacing) ** 2 + 0.75 / mean**2) ** -0.5)
+    for sizes, lengths in ((spacing, expected), (np.full(3, 3e-3), [3e-3] * len(axes))):
+        viscosity = Viscosity()
+        viscosity.inverse_length = 1.0 / np.cbrt(np.prod(sizes))
+        viscosity.inverse_spacing = wp.vec3(*(1.0 / sizes))
+        computed = wp.zeros(len(axes), dtype=scalar, device=device)
+        given = wp.array(axes.astype(np.float32), dtype=vector3, device=device)
+        wp.launch(length_kernel, len(axes), inputs=[viscosity, given, computed], device=device)
+        np.testing.assert_allclose(computed.numpy(), lengths, rtol=16 * ROUND_OFF)
 
 
 def test_turning_everything_turns_the_axis(device):
