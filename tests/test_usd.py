@@ -215,14 +215,16 @@ def test_camera_sees_the_whole_charge(stage, scene):
     assert across > 0.6  # of the half picture: the charge is not a dot
 
 
-def test_material_glows_in_the_colors_of_the_pressure(stage):
-    for path in ("/World/particles", "/World/section"):
+def test_material_glows_in_the_colors_of_the_pressure_and_reflects_no_light(stage):
+    for path in ("/World/particles", "/World/section", "/World/detonators/detonator_0"):
         material, _ = UsdShade.MaterialBindingAPI(stage.GetPrimAtPath(path)).ComputeBoundMaterial()
         surface, _, _ = material.ComputeSurfaceSource()
         assert surface.GetShaderId() == "UsdPreviewSurface"
         reader = UsdShade.Shader(surface.GetInput("emissiveColor").GetConnectedSources()[0][0].source.GetPrim())
         assert reader.GetShaderId() == "UsdPrimvarReader_float3"
         assert reader.GetInput("varname").Get() == "displayColor"
+        assert tuple(surface.GetInput("diffuseColor").Get()) == (0.0, 0.0, 0.0)
+        assert surface.GetInput("ior").Get() == 1.0
 
 
 def test_validators_find_nothing(stage):

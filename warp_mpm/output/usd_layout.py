@@ -5,7 +5,7 @@
     /World/section          Mesh: the field pressure on the scene's section plane
     /World/detonators       one prim each, with position and ignition time
     /World/camera           frames the charge
-    /World/materials        an emissive material that shows displayColor
+    /World/materials        a material that glows in displayColor and reflects nothing
 
 Pressures are in Pa, lengths in m. Primvars are float[], int[], float3[] or color3f[] only: one primvar of another type
 makes Blender drop the rest.
@@ -91,7 +91,7 @@ def author_static(layer: Any, scene: Scene, fields: Sequence[str]) -> None:
     material = _author_material(stage)
     _author_particles(stage, scene, fields, material)
     _author_section(stage, scene, material)
-    _author_detonators(stage, scene)
+    _author_detonators(stage, scene, material)
     _author_camera(stage, scene)
 
 
@@ -153,13 +153,15 @@ def _declare_pressure(shape: Any) -> None:
     color.CreateIndicesAttr()
 
 
-def _author_detonators(stage: Any, scene: Scene) -> None:
+def _author_detonators(stage: Any, scene: Scene, material: Any) -> None:
     UsdGeom.Scope.Define(stage, DETONATORS)
     lower, upper = _charge_box(scene)
     radius = 0.025 * float(np.linalg.norm(upper - lower))  # large enough to show through the side of a thin plate
     for number, detonator in enumerate(scene.detonators):
         prim = _author_detonator(stage, f"{DETONATORS}/detonator_{number}", detonator, radius)
         UsdGeom.XformCommonAPI(prim).SetTranslate(Gf.Vec3d(*detonator.position))
+        if prim.IsA(UsdGeom.Gprim):
+            UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
         time = prim.CreateAttribute("blast:ignitionTime", Sdf.ValueTypeNames.Double)
         time.Set(detonator.time)
         time.SetDocumentation("ignition [s]")
@@ -190,7 +192,7 @@ def _author_material(stage: Any) -> Any:
     surface.CreateIdAttr("UsdPreviewSurface")
     surface.CreateInput("emissiveColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(color)
     surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(0.0))
-    surface.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(1.0)
+    surface.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(1.0)  # as the air: no light is reflected
     material.CreateSurfaceOutput().ConnectToSource(surface.CreateOutput("surface", Sdf.ValueTypeNames.Token))
     return material
 
