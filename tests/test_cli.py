@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -68,7 +69,7 @@ MISTAKES = [
     (("info", "nowhere"), "expected a run directory or a USD file, got 'nowhere'"),
     (("export", "nowhere"), "the following arguments are required: --to"),
     (("export", "nowhere", "--to", "x.pvd"), "export: expected a run directory or a USD file, got 'nowhere'"),
-    (("export", ".", "--to", "x.obj"), "export: --to: expected a file that ends in .pvd, or a directory for ParaView"),
+    (("export", ".", "--to", "x.obj"), "export: --to: expected a file that ends in .pvd or .glb, or a directory"),
     (("run", "two_pont"), "expected a scene file, or one of"),
     (("run", "nowhere/two_point.py"), "got 'nowhere/two_point.py'"),
     ((*RUN, "cel_size=1"), "scene two_point: expected one of cell_size"),
@@ -184,6 +185,9 @@ def test_run_then_info_and_export(capfd, tmp_path, monkeypatch):
     assert "two_point" in capfd.readouterr().out
     assert main(["export", os.path.join("out", "two_point"), "--to", "paraview"]) == 0
     assert capfd.readouterr().out == os.path.join("paraview", "two_point.pvd") + "\n"
+    assert main(["export", os.path.join("out", "two_point"), "--frame", "1", "--to", "two_point.glb"]) == 0
+    assert capfd.readouterr().out == "two_point.glb\n"
+    assert Path("two_point.glb").read_bytes()[:4] == b"glTF"
 
 
 def test_importing_the_package_is_light():

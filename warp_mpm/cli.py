@@ -87,11 +87,13 @@ def _parser() -> argparse.ArgumentParser:
     info.set_defaults(command=_info)
     info.add_argument("path", metavar="PATH", type=Path, help="a run directory or a USD file")
 
-    text = "Write the frames of a run, finished or killed, for other programs."
-    export = commands.add_parser("export", parents=[common], help="write a result for ParaView", description=text)
+    text = "Write frames of a run, finished or killed, for other programs: .pvd for ParaView, .glb for the web."
+    export = commands.add_parser("export", parents=[common], help="write a result as .pvd or .glb", description=text)
     export.set_defaults(command=_export)
     export.add_argument("path", metavar="RUN", type=Path, help="a run directory or a USD file")
-    export.add_argument("--to", metavar="FILE", type=Path, required=True, help="a .pvd file, or a directory for one")
+    to = "a .pvd or .glb file, or a directory for a .pvd"
+    export.add_argument("--to", metavar="FILE", type=Path, required=True, help=to)
+    export.add_argument("--frame", metavar="K", type=int, help="one frame, from 0 (.pvd: default all; .glb: needed)")
 
     text = "Solve problems with exact answers: error tables, pictures, and exit code 1 when a bound is broken."
     check = commands.add_parser("verify", parents=[common], help="compare with exact solutions", description=text)
@@ -201,7 +203,7 @@ def _export(options: argparse.Namespace) -> None:
     """
     from warp_mpm.output.export import export
 
-    print(export(options.path, options.to))
+    print(export(options.path, options.to, options.frame))
 
 
 def _verify(options: argparse.Namespace) -> None:

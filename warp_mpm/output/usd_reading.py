@@ -55,6 +55,31 @@ def open_stage(where: str, path: Path) -> Any:
     return stage
 
 
+def open_run(where: str, path: Path) -> tuple[Path, Any, list[float]]:
+    """The USD file of a run, its stage, and the physical times of its frames [s].
+
+    Raises:
+        InputError: there is no such file, it does not open, or it has no frames.
+    """
+    file = usd_file(where, path)
+    stage = open_stage(where, file)
+    times = frame_times(stage)
+    if not times:
+        raise mistake(where, "the USD file of a run, with frames", f"{str(file)!r}, which has none")
+    return file, stage, times
+
+
+def checked_frame(where: str, frame: int, times: list[float]) -> int:
+    """The number of a frame that is there.
+
+    Raises:
+        InputError: there is no such frame.
+    """
+    if not 0 <= frame < len(times):
+        raise mistake(f"{where}: --frame", f"one of 0 to {len(times) - 1}", frame)
+    return frame
+
+
 def frame_times(stage: Any) -> list[float]:
     """Physical time of every frame [s]; time codes count the frames. Empty if the stage is not that of a run."""
     prim = stage.GetDefaultPrim()

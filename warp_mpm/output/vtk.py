@@ -7,7 +7,7 @@
 The data come from the run's USD file, so the solver is not needed. A .pvd is written when its frames are there.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -16,32 +16,31 @@ import meshio
 import numpy as np
 from pxr import UsdGeom
 
-from warp_mpm.checks import mistake
-from warp_mpm.output.usd_reading import frame_times, open_stage, usd_file
+from warp_mpm.output.usd_reading import checked_frame, open_run
 from warp_mpm.output.whole_file import whole_file, write_error
 
 PLAIN = "particles"  # the shape whose .pvd has no more than the name
 
 
-def write_pvd(source: str | Path, target: str | Path) -> Path:
+def write_pvd(source: str | Path, target: str | Path, frame: int | None = None) -> Path:
     """Write a run as .pvd and .vtu files; what an earlier export left under the same name goes.
 
     Args:
         source: run directory or USD file.
         target: the .pvd file to be, or a directory, in which it gets the name of the run.
+        frame: the only frame, counted from 0; all of them if not given.
 
     Returns:
         The .pvd file of the particles.
 
     Raises:
-        InputError: the source is not the result of a run.
+        InputError: the source is not the result of a run, or has no such frame.
         SimulationError: the disk is full or refuses.
     """
-    file = usd_file("export", Path(source))
-    stage = open_stage("export", file)
-    times = frame_times(stage)
-    if not times:
-        raise mistake("export", "the USD file of a run, with frames", f"{str(file)!r}, which has none")
+    file, stage, times = open_run("export", Path(source))
+    codes = range(len(times)) if frame is None else [checked_frame("export", frame, times)]
+    # A run that took fewer steps than frames were asked for repeats some: left out, because times have to rise.
+    rising = {code: times[code] for code in codes if code == 0 or times[code] > times[code - 1]}
     path = Path(target)
     if path.suffix != ".pvd":
         path = path / f"{file.stem}.pvd"
@@ -56,19 +55,14 @@ def write_pvd(source: str | Path, target: str | Path) -> Path:
     except OSError as error:
         raise write_error(path, error) from error
     for shape, name, collection in zip(shapes, names, series, strict=True):
-        _write_collection(collection, frames, name, times, shape)
+        _write_collection(collection, frames, name, rising, shape)
     return path
 
 
-def _write_collection(path: Path, frames: Path, name: str, times: list[float], shape: Any) -> None:
-    """Write the frames of one shape, then the .pvd that plays them.
-
-    Frames that a run repeated, having taken fewer steps than frames were asked for, are left out: times have to rise.
-    """
+def _write_collection(path: Path, frames: Path, name: str, times: Mapping[int, float], shape: Any) -> None:
+    """Write the frames of one shape, given by number and time [s], then the .pvd that plays them."""
     lines = []
-    for code, time in enumerate(times):
-        if code > 0 and time <= times[code - 1]:
-            continue
+    for code, time in times.items():
         file = frames / f"{name}_{code:05d}.vtu"
         with whole_file(file) as part:
             # Not compressed: packing takes longer than all the rest, and a disk is large.
