@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     command = commands.add_parser("picture", help="draw a picture to show")
     command.set_defaults(command=_picture)
     _add_result(command)
-    command.add_argument("--size", type=int, nargs=2, default=(1600, 800), help="of the picture [pixels]")
+    command.add_argument("--size", type=int, nargs=2, default=(1080, 540), help="of the picture [pixels]")
     command.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("render.png"))
     return parser
 

@@ -45,6 +45,5 @@ def add_legend(picture: Path, file: Path, frame: int, path: Path) -> None:
     figure.text(0.72, 0.16, f"{time:.0f} µs", color=INK, fontsize=1.2 * size, va="bottom")
     path.parent.mkdir(parents=True, exist_ok=True)
     canvas.draw()
-    pixels = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    # A map of 256 colours, and floor: 256 colours are enough, and a third of the bytes.
-    pixels.quantize(256, kmeans=2).save(path, optimize=True)
+    # Without opacity, and packed as well as it goes.
+    Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").save(path, optimize=True)
