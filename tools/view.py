@@ -9,6 +9,7 @@ Mesa's on the CPU.
 """
 
 import argparse
+import math
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -105,7 +106,8 @@ def _check(options: argparse.Namespace) -> None:
 
 def _add_row(table: Table, picture: Picture, values: str) -> None:
     viewer = f"{picture.report['client']} {picture.report['version']}"
-    table.add_row(viewer, values, f"{picture.share_in_map:.1%}", f"{picture.share_of_particles:.1%}")
+    particles = "none in view" if math.isnan(picture.share_of_particles) else f"{picture.share_of_particles:.1%}"
+    table.add_row(viewer, values, f"{picture.share_in_map:.1%}", particles)
 
 
 def _picture(options: argparse.Namespace) -> None:

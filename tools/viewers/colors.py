@@ -1,11 +1,12 @@
 """How true a picture's colours are to the colour map, and to the particles it shows."""
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image
-from pxr import Gf, UsdGeom
+from pxr import UsdGeom
 
 from warp_mpm.output import colormap
 
@@ -33,24 +34,28 @@ def share_in_map(picture: np.ndarray) -> float:
 def share_of_true_particles(picture: np.ndarray, stage: Any, frame: int) -> float:
     """Share of the particles on the side of the camera that have their own colour in the picture, within `DISTANCE`.
 
-    These are the particles of the layer, half a particle thick, that is outermost along the section's normal.
+    These are the particles in view of the layer, half a particle thick, that is outermost along the axis on which the
+    camera looks most; particles that have left the domain are not drawn.
     """
-    points = UsdGeom.PointBased(stage.GetPrimAtPath("/World/particles"))
-    position = np.array(points.GetPointsAttr().Get(frame), dtype=np.float64)
-    color = np.array(UsdGeom.PrimvarsAPI(points).GetPrimvar("displayColor").ComputeFlattened(frame))
-    width = float(np.max(UsdGeom.Points(points).GetWidthsAttr().Get(frame)))
+    points = UsdGeom.Points(stage.GetPrimAtPath("/World/particles"))
+    widths = np.array(points.GetWidthsAttr().Get(frame))
+    inside = widths > 0.0
+    position = np.array(points.GetPointsAttr().Get(frame), dtype=np.float64)[inside]
+    color = np.array(UsdGeom.PrimvarsAPI(points).GetPrimvar("displayColor").ComputeFlattened(frame))[inside]
     camera = UsdGeom.Camera(stage.GetPrimAtPath("/World/camera")).GetCamera(frame).frustum
-    matrix = np.array(camera.ComputeViewMatrix() * camera.ComputeProjectionMatrix())
-    towards_camera = np.array(Gf.Vec3d(camera.ComputeViewDirection())) * -1.0
+    towards_camera = -np.array(camera.ComputeViewDirection())
     axis = int(np.argmax(np.abs(towards_camera)))
     height = position[:, axis] * np.sign(towards_camera[axis])
-    front = height > height.max() - 0.5 * width
+    front = height > height.max() - 0.5 * widths.max()
+    matrix = np.array(camera.ComputeViewMatrix() * camera.ComputeProjectionMatrix())
     clip = np.column_stack([position[front], np.ones(front.sum())]) @ matrix
-    x, y = (0.5 * clip[:, :2] / clip[:, 3:] + 0.5).T
-    size = picture.shape[0]
-    seen = picture[((1.0 - y) * size).astype(int), (x * size).astype(int), :3]
-    expected = np.round(255.0 * srgb(color[front]))
-    return float(np.mean(np.abs(seen - expected).max(axis=1) <= DISTANCE))
+    place = 0.5 + np.array([0.5, -0.5]) * clip[:, :2] / clip[:, 3:]  # from the left and from the top, 0 to 1
+    in_view = np.all((place >= 0.0) & (place < 1.0), axis=1)
+    if not in_view.any():
+        return math.nan
+    column, row = (place[in_view] * len(picture)).astype(int).T
+    expected = np.round(255.0 * srgb(color[front][in_view]))
+    return float(np.mean(np.abs(picture[row, column, :3] - expected).max(axis=1) <= DISTANCE))
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:

@@ -52,7 +52,7 @@ def open_file(path: str) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.usd_import(filepath=path)
     for item in bpy.data.objects:
-        if item.type in ("POINTCLOUD", "MESH") and not item.data.materials:
+        if item.type == "POINTCLOUD" or (item.type == "MESH" and item.parent.name == "detonators"):
             item.data.materials.append(bpy.data.materials["pressure"])
     scene = bpy.context.scene
     scene.camera = bpy.data.objects["camera"]
