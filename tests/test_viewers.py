@@ -1,9 +1,10 @@
 """Real clients: Blender imports a result whole, and in its pictures and Storm's the particles have their own colours.
 
-They live in an environment of their own; without it these tests are skipped, and say how to make it.
+They live in an environment of their own; without it the tests that need them are skipped, and say how to make it.
 """
 
 import importlib
+import subprocess
 import sys
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 from pxr import Usd
 
 import warp_mpm as mpm
-from warp_mpm.output import usd
+from warp_mpm.output import colormap, usd
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))  # they are run by a program beside the package
 colors = importlib.import_module("viewers.colors")
@@ -88,3 +89,59 @@ def check_that_it_can_fail(result, path):
     others = [colors.share_of_true_particles(drawn, stage, frame) for frame in range(FRAMES) if frame != COLLISION]
     assert max(others) < 0.5
     assert colors.share_in_map(drawn[..., [2, 1, 0, 3]]) < 0.5
+
+
+def test_colours_of_the_map_are_told_from_others():
+    """A mixture of two neighbours in the map is one of its colours, grey is not; pixels drawn in part do not count."""
+    table = np.round(255.0 * colormap.srgb_table()).astype(np.int16)
+    between = (table[:-1] + table[1:]) // 2
+    grey = np.full((511, 3), 128, dtype=np.int16)
+    opaque = np.full((2 * 511, 1), 255, dtype=np.int16)
+    picture = np.column_stack([np.concatenate([table, between, grey]), opaque])[None]
+    assert colors.share_in_map(picture) == 0.5
+    picture[0, 511:, 3] = 254
+    assert colors.share_in_map(picture) == 1.0
+
+
+@pytest.fixture
+def own_client(tmp_path, monkeypatch):
+    """Makes a client of some lines of Python, which is run by this interpreter."""
+    monkeypatch.setattr(environment, "INTERPRETER", Path(sys.executable))
+    monkeypatch.setattr(environment, "CLIENTS", tmp_path)
+
+    def make(code):
+        (tmp_path / "client.py").write_text(code)
+
+    return make
+
+
+def test_what_a_client_says_is_understood(own_client):
+    own_client("import json, sys\nprint('noise')\nprint(json.dumps(sys.argv[1:]))")
+    assert environment.run_client("client", "--frame", 3) == ["--frame", "3"]
+    own_client(f"import sys\nprint('no OpenGL', file=sys.stderr)\nsys.exit({environment.MISSING})")
+    with pytest.raises(environment.MissingError, match=r"^client: no OpenGL$"):
+        environment.run_client("client")
+    own_client("1 / 0")
+    with pytest.raises(RuntimeError, match=r"exit code 1\n(.*\n)*ZeroDivisionError"):
+        environment.run_client("client")
+
+
+def test_without_the_wheel_nothing_is_left_and_the_reason_is_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(environment, "ENVIRONMENT", tmp_path / "viewers")
+    monkeypatch.setattr(environment, "INTERPRETER", tmp_path / "viewers" / "python")
+    with pytest.raises(environment.MissingError, match=r"^no viewers with Blender; make it by: python tools/view.py"):
+        environment.interpreter()
+    monkeypatch.setattr(environment, "PYTHON", (3, 99))
+    with pytest.raises(environment.MissingError, match=r"needs Python 3\.99, and there is no python3\.99 on the path$"):
+        environment.install()
+    monkeypatch.setattr(environment, "PYTHON", sys.version_info[:2])
+
+    def fail(*command):
+        (tmp_path / "viewers").mkdir(exist_ok=True)
+        if "pip" in command:
+            raise subprocess.CalledProcessError(1, command, "", "ERROR: one\nERROR: No matching distribution found\n")
+
+    monkeypatch.setattr(environment, "_quietly", fail)
+    with pytest.raises(environment.MissingError, match=r"does not install: ERROR: No matching distribution found$"):
+        environment.install()
+    assert not any(tmp_path.iterdir())

@@ -42,7 +42,8 @@ def install() -> str:
         raise MissingError(f"{WHEEL} needs Python {wanted}, and there is no python{wanted} on the path")
     try:
         _quietly(python, "-m", "venv", "--clear", str(ENVIRONMENT))
-        _quietly(str(INTERPRETER), "-m", "pip", "install", "--quiet", "--only-binary", ":all:", WHEEL)
+        options = ("--quiet", "--disable-pip-version-check", "--only-binary", ":all:")
+        _quietly(str(INTERPRETER), "-m", "pip", "install", *options, WHEEL)
         _quietly(str(INTERPRETER), "-c", "import bpy")
     except subprocess.SubprocessError as error:
         shutil.rmtree(ENVIRONMENT, ignore_errors=True)
