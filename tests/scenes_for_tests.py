@@ -16,6 +16,7 @@ from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box
 from warp_mpm.kernels import transfer
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.kernels.precision import DIGITS
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.materials import Material, ammonium_nitrate
 from warp_mpm.model import build_model
@@ -24,7 +25,7 @@ from warp_mpm.solver import Solver
 from warp_mpm.state import State
 
 CELL = 0.01  # edge of a cell [m]
-ROUND_OFF = 2.0**-24  # of a number in single precision, relative
+ROUND_OFF = 0.5**DIGITS  # of a number, relative; 6e-8 in single precision
 OPEN = Walls.all(Wall.OPEN)
 STICK = Walls.all(Wall.STICK)
 CORNER = PointDetonator((0.0, 0.0, 0.0))

@@ -75,7 +75,7 @@ class Recorder:
             wp.array(flat.astype(np.int32), dtype=int, device=device),
             wp.array(begins.astype(np.int32), dtype=int, device=device),
             wp.array(_flat(scene.domain, cell).astype(np.int32), dtype=int, device=device),
-            wp.array(fraction.astype(np.float32), dtype=vector3, device=device),
+            wp.array(fraction, dtype=vector3, device=device),
         ]
         self._gauges = len(scene.gauges)
         self._gauge_places = _gauge_places(scene, device)

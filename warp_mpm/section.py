@@ -6,7 +6,7 @@ from warp_mpm.state import State
 
 
 def section_pressure(state: State) -> np.ndarray:
-    """Field pressure (nodes_u, nodes_v) float32 [Pa] at the nodes of the section plane.
+    """Field pressure (nodes_u, nodes_v) [Pa] at the nodes of the section plane.
 
     Between two layers of nodes it is interpolated linearly.
     """
@@ -15,7 +15,7 @@ def section_pressure(state: State) -> np.ndarray:
     pressure = state.field_pressure()
     place = (plane.coordinate - domain.lower[plane.axis]) / domain.spacing[plane.axis]
     below = int(np.clip(np.floor(place), 0, domain.cells[plane.axis] - 1))
-    share = np.float32(place - below)
+    share = pressure.dtype.type(place - below)
     low = np.take(pressure, below, axis=plane.axis)
     high = np.take(pressure, below + 1, axis=plane.axis)
     return (1 - share) * low + share * high

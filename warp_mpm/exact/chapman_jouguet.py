@@ -15,7 +15,7 @@ Reference: W. Fickett, W. C. Davis, Detonation: Theory and Experiment, Dover 200
 import math
 from dataclasses import dataclass
 
-from warp_mpm.kernels.eos import EquationOfState
+from warp_mpm.kernels.eos import EquationOfState, evaluate
 
 HIGHEST_COMPRESSION = 20.0  # rho / rho0 up to which the state is searched
 SEARCH_STEP = 1.01  # growth of rho in the search
@@ -38,9 +38,8 @@ def hugoniot_pressure(eos: EquationOfState, initial_density: float, energy: floa
 
     Infinite beyond the strongest compression that the Hugoniot allows.
     """
-    record = eos.record()
-    offset = float(eos.pressure_offset(record, density))
-    slope = float(eos.pressure_slope(record, density))
+    offset = evaluate(eos, eos.pressure_offset, density)
+    slope = evaluate(eos, eos.pressure_slope, density)
     room = 1.0 - 0.5 * slope * (1.0 / initial_density - 1.0 / density)
     return (offset + slope * energy) / room if room > 0.0 else math.inf
 
@@ -51,7 +50,6 @@ def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: 
     Raises:
         ValueError: the equation of state has no such state up to a compression of 20.
     """
-    record = eos.record()
     initial_volume = 1.0 / initial_density
 
     def excess(density: float) -> float:
@@ -61,7 +59,7 @@ def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: 
             return math.inf
         compression = initial_volume - 1.0 / density
         internal = energy + 0.5 * pressure * compression
-        return density**2 * float(eos.sound_speed_squared(record, density, internal)) * compression - pressure
+        return density**2 * evaluate(eos, eos.sound_speed_squared, density, internal) * compression - pressure
 
     low = initial_density * SEARCH_STEP
     high = low

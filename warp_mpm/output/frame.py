@@ -11,11 +11,11 @@ class Frame:
 
     index: int  # 0, 1, ..., frames - 1
     time: float  # [s]
-    position: np.ndarray  # (n, 3) float32 [m], creation order; a particle that left keeps its last position
-    pressure: np.ndarray  # (n,) float32 [Pa]; 0 for a particle that left
+    position: np.ndarray  # (n, 3) [m], creation order; a particle that left keeps its last position
+    pressure: np.ndarray  # (n,) [Pa]; 0 for a particle that left
     inside: np.ndarray  # (n,) bool; False once the particle has left through an open face
-    section: np.ndarray  # (nodes_u, nodes_v) float32 [Pa]: field pressure at the nodes of the section plane
-    fields: dict[str, np.ndarray] = field(default_factory=dict)  # further particle fields, (n,) or (n, 3) float32
+    section: np.ndarray  # (nodes_u, nodes_v) [Pa]: field pressure at the nodes of the section plane
+    fields: dict[str, np.ndarray] = field(default_factory=dict)  # further particle fields, (n,) or (n, 3)
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class SectionPicture:
     """The field pressure on the section plane at an instant worth a picture."""
 
     time: float  # [s], the true time of the step
-    pressure: np.ndarray  # (nodes_u, nodes_v) float32 [Pa]
+    pressure: np.ndarray  # (nodes_u, nodes_v) [Pa]
 
 
 @dataclass(frozen=True)
@@ -43,4 +43,4 @@ class LineRecord:
 
     time: np.ndarray  # (steps,) float64 [s]
     distance: np.ndarray  # (points,) float64 [m] from the line's start
-    pressure: np.ndarray  # (steps, points) float32 [Pa]
+    pressure: np.ndarray  # (steps, points) [Pa]
