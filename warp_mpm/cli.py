@@ -6,6 +6,7 @@ Modules that take long to import are imported where they are used: `list` and `-
 """
 
 import argparse
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -112,6 +113,23 @@ def _add_solving(parser: argparse.ArgumentParser) -> None:
     _add_settings(parser, "--solver", "settings of the solver, e.g. shape=linear viscosity=1.5,0.06")
     parser.add_argument("--device", help="cpu, cuda:0, ... (default: the GPU if there is one)")
     parser.add_argument("--threads", type=int, help="threads on a CPU (default: one per core)")
+    parser.add_argument("--precision", help="single or double (default: WARP_MPM_PRECISION, or single)")
+
+
+def _choose_precision(precision: str | None) -> None:
+    """Have the kernels made in a precision, which is that of the whole process; if none is given, as they would be.
+
+    Raises:
+        InputError: there is no such precision, or this process has kernels of the other one.
+    """
+    if precision is not None:
+        os.environ["WARP_MPM_PRECISION"] = precision
+    try:
+        from warp_mpm.kernels.precision import PRECISION
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    if precision not in (None, PRECISION):
+        raise mistake("precision", f"{PRECISION}, for which this process has kernels", repr(precision))
 
 
 def _solver_config(options: argparse.Namespace) -> SolverConfig:
@@ -137,6 +155,8 @@ def _run(options: argparse.Namespace) -> None:
         InputError: scene, parameters, settings, device or output directory do not work.
         SimulationError: the run cannot go on.
     """
+    _choose_precision(options.precision)
+
     from rich.console import Console
 
     from warp_mpm.output.progress_bar import progress_on
@@ -213,6 +233,8 @@ def _verify(options: argparse.Namespace) -> None:
         InputError: unknown problem, wrong settings, device or output directory.
         VerificationError: a bound is broken, or a run could not go on.
     """
+    _choose_precision(options.precision)
+
     from warp_mpm.verification.command import print_problems, verify
     from warp_mpm.verification.problems import all_problems
     from warp_mpm.verification.session import Setup

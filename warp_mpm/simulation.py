@@ -15,6 +15,7 @@ from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, totals_of
 from warp_mpm.errors import SimulationError
 from warp_mpm.guards import check_faults, check_memory, writable_directory
+from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.model import Model, build_model
 from warp_mpm.output.frame import Frame, SectionPicture
@@ -104,7 +105,8 @@ class _Run:
         check_memory(self.model)
         progress.message(
             f"{scene.name}: {scene.particle_count:,} particles in {math.prod(scene.domain.cells):,} cells on "
-            f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}; preparing kernels"
+            f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}, in {PRECISION} precision; "
+            "preparing kernels"
         )
         self.state = State(self.model)
         self.solver = Solver(self.model, self.state, self.launcher)
@@ -280,6 +282,7 @@ class _Run:
             "version": VERSION,
             "device": self.launcher.device.name,
             "threads": self.launcher.threads,
+            "precision": PRECISION,
             "particles": self.scene.particle_count,
             "cells": list(self.scene.domain.cells),
             "charges": [_charge_values(charge) for charge in self.scene.charges],
