@@ -29,7 +29,7 @@ from warp_mpm.kernels.record import (
 )
 from warp_mpm.output.frame import GaugeRecord, LineRecord
 from warp_mpm.scene import Domain, Scene, Segment, Vector
-from warp_mpm.state import State
+from warp_mpm.state import NUMBER, State
 
 CHUNK = 512  # steps between two fetches
 PATH_REACH = 1.0  # cells around the front path in which its pressure is taken
@@ -111,13 +111,13 @@ class Recorder:
         """What the gauges showed since this was last asked.
 
         Returns:
-            Times (steps,) float64 [s], and (steps, gauges, 8) float32: pressure [Pa], velocity [m/s], density [kg/m3],
+            Times (steps,) float64 [s], and (steps, gauges, 8): pressure [Pa], velocity [m/s], density [kg/m3],
             position [m].
         """
         self._fetch()
         fetched = self._fetched[self._gauges_taken :]
         self._gauges_taken = len(self._fetched)
-        rows = np.concatenate([np.empty((0, self._rows.shape[1]), np.float32), *(rows for _, rows in fetched)])
+        rows = np.concatenate([np.empty((0, self._rows.shape[1]), NUMBER), *(rows for _, rows in fetched)])
         return np.concatenate([np.empty(0), *(time for time, _ in fetched)]), self._gauge_lanes(rows)
 
     def result(self) -> StepRecord:
@@ -220,7 +220,7 @@ def _gauge_places(scene: Scene, device: wp.Device) -> GaugePlaces:
     cell, fraction = _cells_of(scene.domain, points)
     places = GaugePlaces()
     places.cell = wp.array(cell.astype(np.int32), dtype=wp.vec3i, device=device)
-    places.fraction = wp.array(fraction.astype(np.float32), dtype=vector3, device=device)
+    places.fraction = wp.array(fraction, dtype=vector3, device=device)
     places.particle = wp.zeros(len(points), dtype=int, device=device)
     places.lower = wp.vec3d(*scene.domain.lower)
     places.spacing = wp.vec3d(*scene.domain.spacing)

@@ -31,10 +31,10 @@ class GaugeRecord:
     """What a gauge showed at every step (see `SceneBuilder.gauge`)."""
 
     time: np.ndarray  # (steps,) float64 [s]
-    pressure: np.ndarray  # (steps,) float32 [Pa]
-    velocity: np.ndarray  # (steps, 3) float32 [m/s]
-    density: np.ndarray  # (steps,) float32 [kg/m3]
-    position: np.ndarray  # (steps, 3) float32 [m]
+    pressure: np.ndarray  # (steps,) [Pa]
+    velocity: np.ndarray  # (steps, 3) [m/s]
+    density: np.ndarray  # (steps,) [kg/m3]
+    position: np.ndarray  # (steps, 3) [m]
 
 
 @dataclass(frozen=True)
