@@ -1,6 +1,7 @@
 """Single and double precision: the choice, and double at work (single is what all other tests run in)."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -39,6 +40,13 @@ def test_double_precision():
     selected = [TESTS / "double_precision.py", *(f"{materials}::{name}" for name in on_the_host)]
     done = in_precision("double", "-m", "pytest", *selected)
     assert done.returncode == 0, done.stdout
+
+
+def test_one_module_names_the_types_of_single_precision():
+    """Elsewhere they would round what is double."""
+    types = re.compile(r"\bwp\.(float32|vec[234]f?|mat(22|33|44)f?)\b")
+    files = [path for room in ("kernels", "warp_mpm") for path in sorted((TESTS.parent / room).rglob("*.py"))]
+    assert {path.name for path in files if types.search(path.read_text(encoding="utf-8"))} == {"precision.py"}
 
 
 def test_the_last_fraction_is_the_largest_number_below_one():

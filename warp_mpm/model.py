@@ -181,5 +181,5 @@ def _viscosity(scene: Scene, config: SolverConfig) -> Viscosity:
     viscosity.quadratic, viscosity.linear = config.viscosity
     viscosity.length = scene.domain.cell_volume ** (1 / 3)
     viscosity.inverse_length = 1.0 / viscosity.length
-    viscosity.inverse_spacing = wp.vec3(*(1.0 / size for size in scene.domain.spacing))
+    viscosity.inverse_spacing = vector3(*(1.0 / size for size in scene.domain.spacing))
     return viscosity
