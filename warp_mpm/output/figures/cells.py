@@ -1,0 +1,56 @@
+"""Particles counted into cells: where matter is, and its pressure, on a regular grid that surfaces are made of."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warp_mpm.output.figures.content import setup_of
+from warp_mpm.output.saved_frames import SavedFrame
+from warp_mpm.run_directory import Run
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Equal cells: those of the domain, or coarser ones where a frame has too few particles to fill these."""
+
+    lower: np.ndarray  # (3,) lower corner of the first cell [m]
+    spacing: np.ndarray  # (3,) [m]
+    filled: np.ndarray  # (nx, ny, nz) bool: there is a particle
+    pressure: np.ndarray  # (nx, ny, nz) float64, mean over its particles [Pa]; 0 without any
+
+    def centres(self, axis: int) -> np.ndarray:
+        """Coordinates of the cells' centres along an axis [m]."""
+        return self.lower[axis] + (np.arange(self.filled.shape[axis]) + 0.5) * self.spacing[axis]
+
+
+def frame_cells(run: Run, frame: SavedFrame) -> Cells:
+    """The cells of a frame that hold particles."""
+    return _count(run, frame.position[frame.inside], frame.pressure[frame.inside])
+
+
+def charge_cells(run: Run) -> list[Cells]:
+    """The cells in which each charge is at the start."""
+    first, ids = run.frames[0], run.frames.ids
+    ends = np.cumsum([charge["particles"] for charge in run.summary["charges"]])
+    owner = np.searchsorted(ends, ids, side="right")
+    own = [owner == number for number in range(len(ends))]
+    return [_count(run, first.position[mine], first.pressure[mine]) for mine in own]
+
+
+def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
+    domain = setup_of(run).domain
+    lower, merged = np.array(domain.lower), _merged(run)
+    spacing = merged * np.array(domain.spacing)
+    shape = np.ceil(np.array(domain.cells) / merged).astype(int)
+    cell = np.clip(((position - lower) / spacing).astype(int), 0, shape - 1)
+    flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
+    count = np.bincount(flat, minlength=shape.prod())
+    total = np.bincount(flat, weights=pressure, minlength=shape.prod())
+    mean = total / np.maximum(count, 1)
+    return Cells(lower, spacing, (count > 0).reshape(shape), mean.reshape(shape))
+
+
+def _merged(run: Run) -> int:
+    """Cells to an edge of a counting cell, so that each holds a particle where matter is as dense as at the start."""
+    volume = sum(charge["volume_m3"] for charge in run.summary["charges"]) / len(run.frames.ids)
+    return max(1, int(np.ceil(np.cbrt(volume / setup_of(run).domain.cell_volume) - 1e-6)))
