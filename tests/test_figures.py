@@ -1,34 +1,55 @@
 """The pictures: right data, right units, right way up, one colour scale; drawn from what a run left behind alone."""
 
+import os
+import shutil
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from PIL import Image
 from scenes_for_tests import OPEN, block
 
-from warp_mpm.errors import SimulationError
+from warp_mpm.config import Save
+from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.output.description import scene_values
 from warp_mpm.output.figures import PICTURES, draw_figures
+from warp_mpm.output.figures.charge import charge_figure
+from warp_mpm.output.figures.content import pressure_range
 from warp_mpm.output.figures.energy import energy_figure
+from warp_mpm.output.figures.field import field_figure
 from warp_mpm.output.figures.front import front_figure
+from warp_mpm.output.figures.gauges import gauges_figure
+from warp_mpm.output.figures.maps import arrival_figure, peak_figure
+from warp_mpm.output.figures.particles import particles_figure
 from warp_mpm.output.figures.section import section_figure
 from warp_mpm.output.figures.style import save
 from warp_mpm.output.frame import Frame, LineRecord, SectionPicture, SectionRecord, StepRecord
 from warp_mpm.output.steps import write_steps
 from warp_mpm.output.tables import HistoryWriter, write_summary
 from warp_mpm.output.usd import UsdWriter
+from warp_mpm.progress import Silent
 from warp_mpm.run_directory import Run, load
 from warp_mpm.scene import Scene
 from warp_mpm.scene_loading import load_scene
+from warp_mpm.simulation import simulate
 
 GPA = 1e9
+GAUGES = """time_s,a_pressure_pa,a_velocity_x_m_s,a_velocity_y_m_s,a_velocity_z_m_s,a_density_kg_m3,b_pressure_pa,\
+b_velocity_x_m_s,b_velocity_y_m_s,b_velocity_z_m_s,b_density_kg_m3
+0.0,0.0,0.0,0.0,0.0,1000.0,1e9,0.0,0.0,0.0,1000.0
+1e-06,2e9,3.0,0.0,4.0,1200.0,1e9,0.0,0.0,0.0,1000.0
+3e-06,1e9,6.0,0.0,8.0,1100.0,1e9,0.0,0.0,0.0,1000.0
+"""
 
 
-def left_by(directory, scene: Scene, *, pictures=(), line=None, history=(), frames=()) -> Run:
+def left_by(directory, scene: Scene, *, pictures=(), line=None, history=(), frames=(), arrival=np.nan) -> Run:
     """A run directory with made-up results of a scene."""
     write_summary(directory / "summary.json", {"status": "complete", **scene_values(scene)})
     nodes = [scene.domain.cells[axis] + 1 for axis in scene.section.in_plane]
-    section = SectionRecord(np.zeros(nodes, np.float32), np.full(nodes, np.nan, np.float32))
+    highest = np.max([picture.pressure for picture in pictures], axis=0) if pictures else np.zeros(nodes)
+    section = SectionRecord(highest, np.full(nodes, arrival))
     time = np.zeros(1) if line is None else line.time
     peaks = np.zeros(len(time), np.float32)
     record = StepRecord(time, peaks, peaks, peaks, None, np.zeros((len(time), 0)), None, line, section)
@@ -86,14 +107,18 @@ def panels_of(figure: Figure) -> list:
 
 
 def test_every_figure_is_a_picture_file(scene, tmp_path):
-    run = left_by(tmp_path, scene, pictures=pictures_of(scene), line=record_of(scene), history=history_of())
-    assert draw_figures(run, tmp_path / "figures") == {}
-    files = sorted((tmp_path / "figures").iterdir())
-    assert [file.name for file in files] == sorted(f"{name}.png" for name in PICTURES)
-    for file in files:
-        pixels = imread(file)[..., :3]
+    (tmp_path / "gauges.csv").write_text(GAUGES)
+    frames = [replace(first_frame(scene), index=k, time=t) for k, t in enumerate((0.0, scene.picture_times[0]))]
+    pictures, line = pictures_of(scene), record_of(scene)
+    run = left_by(tmp_path, scene, pictures=pictures, line=line, history=history_of(), frames=frames, arrival=1e-6)
+    drawn, missing = draw_figures(run, tmp_path / "figures")
+    assert missing == {}
+    assert drawn == [f"{name}.png" for name in PICTURES]
+    assert sorted(drawn) == sorted(os.listdir(tmp_path / "figures"))
+    for file in drawn:
+        pixels = imread(tmp_path / "figures" / file)[..., :3]
         assert min(pixels.shape[:2]) > 400
-        assert pixels.std() > 0.05
+        assert pixels.std() > 0.04
 
 
 def test_section_has_a_panel_an_instant_on_one_scale(scene, tmp_path):
@@ -208,3 +233,142 @@ def test_colors_reach_the_highest_pressure_but_not_far_beyond_the_fronts(scene, 
     level = SectionPicture(1e-6, np.full_like(picture.pressure, highest * GPA))
     figure = section_figure(left_by(tmp_path, scene, pictures=[level]))
     assert panels_of(figure)[0].images[0].get_clim() == pytest.approx((0.0, limit), rel=1e-4)
+
+
+def run_of(directory, **settings) -> Run:
+    """A real run of a small plate, lit at both ends, without pictures."""
+    scene = load_scene("two_point", cell_size=2e-2, **settings)
+    simulate(scene, save=Save(frames=12, figures=False), output=directory)
+    return load(directory)
+
+
+@pytest.fixture(scope="module")
+def plate(tmp_path_factory) -> Run:
+    return run_of(tmp_path_factory.mktemp("plate"))
+
+
+def test_a_killed_run_is_drawn_as_far_as_it_got(plate, tmp_path):
+    """Without steps.npz, with the summary that a run writes at its start."""
+    for name in ("two_point.usdc", "history.csv"):
+        shutil.copy(plate.directory / name, tmp_path / name)
+    write_summary(
+        tmp_path / "summary.json", {"status": "running", **scene_values(load_scene("two_point", cell_size=2e-2))}
+    )
+    drawn, missing = draw_figures(load(tmp_path), tmp_path / "figures")
+    assert set(drawn) == {"charge.png", "particles.png", "field.png", "section.png", "energy.png"}
+    assert {name: "killed" in reason for name, reason in missing.items()} == {
+        "front.png": True,
+        "peak.png": True,
+        "arrival.png": True,
+        "gauges.png": False,
+    }
+
+
+def test_without_usd_what_is_left_is_drawn(plate, tmp_path):
+    for name in ("summary.json", "steps.npz", "history.csv"):
+        shutil.copy(plate.directory / name, tmp_path / name)
+    drawn, missing = draw_figures(load(tmp_path), tmp_path / "figures")
+    assert set(drawn) == {"section.png", "front.png", "peak.png", "arrival.png", "energy.png"}
+    assert missing["field.png"] == "the USD file with the frames is gone"
+
+
+def test_an_interrupted_run_is_drawn(tmp_path):
+    class Stopping(Silent):
+        def update(self, time: float, end: float, step: int, note: str) -> None:
+            if time > 22e-6:
+                raise KeyboardInterrupt
+
+    scene = load_scene("two_point", cell_size=2e-2)
+    with pytest.raises(KeyboardInterrupt):
+        simulate(scene, save=Save(frames=20), output=tmp_path, progress=Stopping())
+    first = sorted(os.listdir(tmp_path / "figures"))
+    assert "front.png" in first
+    assert "field.png" in first
+    shutil.rmtree(tmp_path / "figures")
+    assert sorted(draw_figures(load(tmp_path), tmp_path / "figures")[0]) == first
+    (panel,) = panels_of(section_figure(load(tmp_path)))  # the first of the instants, 20 us
+    assert panel.get_title() == f"(a)  {load(tmp_path).pictures[0].time * 1e6:.1f} µs"
+
+
+def test_the_field_is_the_surface_at_the_frames_nearest_to_the_instants(plate):
+    figure = field_figure(plate)
+    panels = panels_of(figure)
+    frames = [plate.frames.nearest(time) for time in plate.setup.picture_times]
+    titles = list(dict.fromkeys(f"{frame.time * 1e6:.1f} µs" for frame in frames))
+    assert [axes.get_title()[5:] for axes in panels] == titles
+    faces = panels[-1].collections[0]
+    assert len(faces.get_paths()) == 10 * 20 + 10 + 20  # front, above and beside: cells of 20 mm, one deep
+    last = plate.frames[-1]
+    cells = np.floor(last.position.astype(float) / [0.02, 0.02, 0.02]).astype(int).clip(0, [9, 19, 0])
+    means = [last.pressure[(cells == cell).all(axis=1)].mean() / GPA for cell in np.unique(cells, axis=0)]
+    assert len(means) == 200
+    difference = np.abs(np.array(faces.get_array())[:, None] - means).min(axis=1)
+    assert difference.max() < 1e-6 * max(means)
+    assert {axes.collections[0].get_clim() for axes in panels} == {tuple(p / GPA for p in pressure_range(plate))}
+
+
+def test_peak_map_is_in_multiples_of_cj(plate):
+    figure = peak_figure(plate)
+    image = figure.axes[0].images[0]
+    expected = plate.steps.section.peak.T / plate.summary["p_cj_pa"]
+    np.testing.assert_allclose(image.get_array(), expected)
+    assert expected.max() > 1.0
+    assert figure.axes[1].get_ylabel() == "highest pressure / $p_{CJ}$"
+
+
+def test_the_front_arrives_when_it_should(plate):
+    """Within the time for one and a half cells: the booster burns one at once, its particles reach half a cell on."""
+    shown = np.array(arrival_figure(plate).axes[0].images[0].get_array())
+    x, y = np.linspace(0.0, 200.0, 11), np.linspace(0.0, 400.0, 21)[:, None]
+    expected = np.minimum(np.hypot(x - 100.0, y), np.hypot(x - 100.0, y - 400.0)) / 2.8
+    np.testing.assert_allclose(shown, expected, atol=1.5 * 20.0 / 2.8)
+
+
+def test_charge_figure_names_sizes_and_times(scene, tmp_path):
+    figure = charge_figure(left_by(tmp_path, scene, frames=[first_frame(scene)]))
+    texts = {text.get_text() for text in figure.axes[0].texts}
+    assert {"200 mm", "400 mm", "20 mm", "1: 0 µs", "4: 1.5 µs", "6: 2.5 µs"} <= texts
+    assert any("ammonium nitrate, 1.6 kg" in text and "its faces: all slip" in text for text in texts)
+
+
+def test_particles_figure_shows_the_particles_of_some_cells(scene, tmp_path):
+    figure = particles_figure(left_by(tmp_path, scene, frames=[first_frame(scene)]))
+    assert figure.get_suptitle() == "1,600 particles, cells of 20 × 20 × 20 mm"
+    dots = np.array(figure.axes[1].lines[-2].get_data()).T  # the last is the detonator
+    left, right = figure.axes[1].get_xlim()
+    spaced = np.unique(np.round(dots[:, 0], 6))
+    np.testing.assert_allclose(np.diff(spaced), 10.0, rtol=1e-5)  # two to a cell
+    assert np.all((spaced > left - 20.0) & (spaced < right + 20.0))
+
+
+def test_gauges_are_shown_with_their_impulse(scene, tmp_path):
+    (tmp_path / "gauges.csv").write_text(GAUGES)
+    pressure, impulse, speed = gauges_figure(left_by(tmp_path, scene)).axes
+    assert [line.get_label() for line in pressure.lines[:2]] == ["a", "b"]
+    np.testing.assert_allclose(pressure.lines[0].get_data(), [[0.0, 1.0, 3.0], [0.0, 2.0, 1.0]])
+    np.testing.assert_allclose(impulse.lines[0].get_ydata(), [0.0, 1.0, 4.0])  # kPa s
+    np.testing.assert_allclose(speed.lines[0].get_ydata(), [0.0, 5.0, 10.0])
+
+
+def test_a_film_has_every_frame(plate, tmp_path):
+    drawn, _ = draw_figures(plate, tmp_path, ["section"], animate="gif")
+    assert drawn == ["section.png", "section.gif"]
+    with Image.open(tmp_path / "section.gif") as film:
+        assert film.n_frames == len(plate.frames)
+
+
+def test_mp4_needs_ffmpeg(plate, tmp_path, monkeypatch):
+    monkeypatch.setattr("matplotlib.animation.FFMpegWriter.bin_path", lambda: "no-such-program")
+    with pytest.raises(InputError, match="ffmpeg") as caught:
+        draw_figures(plate, tmp_path, ["field"], animate="mp4")
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_picture_is_one_line(plate, tmp_path):
+    with pytest.raises(InputError, match=r"expected any of charge, .*, got 'feild'"):
+        draw_figures(plate, tmp_path, ["feild"])
+
+
+def test_a_usd_file_alone_cannot_be_drawn(plate, tmp_path):
+    with pytest.raises(InputError, match=r"expected a run directory whose summary\.json describes the scene"):
+        draw_figures(load(plate.file), tmp_path)

@@ -1,10 +1,10 @@
 """Particles counted into cells: where matter is, and its pressure, on a regular grid that surfaces are made of."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warp_mpm.output.figures.content import setup_of
+from warp_mpm.output.figures.content import frames_of, setup_of
 from warp_mpm.output.saved_frames import SavedFrame
 from warp_mpm.run_directory import Run
 
@@ -17,6 +17,7 @@ class Cells:
     spacing: np.ndarray  # (3,) [m]
     filled: np.ndarray  # (nx, ny, nz) bool: there is a particle
     pressure: np.ndarray  # (nx, ny, nz) float64, mean over its particles [Pa]; 0 without any
+    share: np.ndarray  # (nx, ny, nz) float64, particles over those in a full cell at the start
 
     def centres(self, axis: int) -> np.ndarray:
         """Coordinates of the cells' centres along an axis [m]."""
@@ -29,12 +30,24 @@ def frame_cells(run: Run, frame: SavedFrame) -> Cells:
 
 
 def charge_cells(run: Run) -> list[Cells]:
-    """The cells in which each charge is at the start."""
-    first, ids = run.frames[0], run.frames.ids
+    """The cells in which each charge is at the start.
+
+    Raises:
+        NothingToDrawError: the frames of the run are gone.
+    """
+    first, ids = frames_of(run)[0], run.frames.ids
     ends = np.cumsum([charge["particles"] for charge in run.summary["charges"]])
     owner = np.searchsorted(ends, ids, side="right")
     own = [owner == number for number in range(len(ends))]
     return [_count(run, first.position[mine], first.pressure[mine]) for mine in own]
+
+
+def joined(parts: list[Cells]) -> tuple[Cells, np.ndarray]:
+    """All cells of some parts, and the number of the part (nx, ny, nz) that each is of."""
+    owner = np.zeros(parts[0].filled.shape, dtype=int)
+    for number, part in enumerate(parts):
+        owner[part.filled] = number
+    return replace(parts[0], filled=np.any([part.filled for part in parts], axis=0)), owner
 
 
 def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
@@ -47,10 +60,15 @@ def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
     count = np.bincount(flat, minlength=shape.prod())
     total = np.bincount(flat, weights=pressure, minlength=shape.prod())
     mean = total / np.maximum(count, 1)
-    return Cells(lower, spacing, (count > 0).reshape(shape), mean.reshape(shape))
+    share = count * (_particle_volume(run) / spacing.prod())
+    return Cells(lower, spacing, (count > 0).reshape(shape), mean.reshape(shape), share.reshape(shape))
 
 
 def _merged(run: Run) -> int:
     """Cells to an edge of a counting cell, so that each holds a particle where matter is as dense as at the start."""
-    volume = sum(charge["volume_m3"] for charge in run.summary["charges"]) / len(run.frames.ids)
-    return max(1, int(np.ceil(np.cbrt(volume / setup_of(run).domain.cell_volume) - 1e-6)))
+    return max(1, int(np.ceil(np.cbrt(_particle_volume(run) / setup_of(run).domain.cell_volume) - 1e-6)))
+
+
+def _particle_volume(run: Run) -> float:
+    """Volume at the start to one of the particles that are in the file [m3]."""
+    return sum(charge["volume_m3"] for charge in run.summary["charges"]) / len(run.frames.ids)

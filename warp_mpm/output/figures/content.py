@@ -8,11 +8,12 @@ import numpy as np
 from warp_mpm.checks import mistake
 from warp_mpm.output.description import SceneDescription
 from warp_mpm.output.figures.style import GIGAPASCAL, NothingToDrawError
-from warp_mpm.output.frame import SectionPicture
-from warp_mpm.output.saved_frames import SavedFrame
+from warp_mpm.output.frame import SectionPicture, StepRecord
+from warp_mpm.output.saved_frames import Frames, SavedFrame
 from warp_mpm.run_directory import SUMMARY, Run
 
 COLOR_LIMIT = 1.6  # of p_CJ: brief focusing in a corner would otherwise leave the fronts dark; as in the USD file
+FAINT = 0.02  # share of the range of colours below which gas is not worth showing
 BRIGHTEST_SHARE = 0.003  # of an instant's values that may lie above the last colour
 
 
@@ -44,15 +45,37 @@ def picture_frames(run: Run) -> list[SavedFrame]:
     """The frames nearest to the scene's picture instants, each once.
 
     Raises:
-        NothingToDrawError: the run did not get as far as the first of them.
+        NothingToDrawError: the run did not get as far as the first of them, or its frames are gone.
     """
-    times = run.frames.times
+    times = frames_of(run).times
     step = float(np.diff(times).max(initial=0.0))
     instants = [time for time in setup_of(run).picture_times if time <= times[-1] + 0.5 * step]
     frames = {frame.index: frame for frame in map(run.frames.nearest, instants)}
     if not frames:
         raise NothingToDrawError("the run did not get as far as its first picture")
     return list(frames.values())
+
+
+def frames_of(run: Run) -> Frames:
+    """The saved frames.
+
+    Raises:
+        NothingToDrawError: they are gone.
+    """
+    if run.file is None:
+        raise NothingToDrawError("the USD file with the frames is gone")
+    return run.frames
+
+
+def step_record(run: Run) -> StepRecord:
+    """What every step left.
+
+    Raises:
+        NothingToDrawError: the run was killed, or goes on.
+    """
+    if run.steps is None:
+        raise NothingToDrawError("the run was killed, or goes on: it has left no record of its steps")
+    return run.steps
 
 
 def cj_pressure(run: Run) -> float | None:
@@ -70,6 +93,12 @@ def pressure_range(run: Run) -> tuple[float, float]:
     if run.steps is not None and run.steps.line is not None:
         shown.append(run.steps.line.pressure)
     return range_of(shown, cj_pressure(run))
+
+
+def faint_pressure(run: Run) -> float:
+    """The pressure below which gas is not worth showing [Pa]."""
+    lower, upper = pressure_range(run)
+    return lower + FAINT * (upper - lower)
 
 
 def range_of(pressures: Sequence[np.ndarray], cj_pressure: float | None) -> tuple[float, float]:

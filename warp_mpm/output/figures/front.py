@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.output import colormap
-from warp_mpm.output.figures.content import cj_pressure, pressure_range, setup_of
+from warp_mpm.output.figures.content import cj_pressure, pressure_range, setup_of, step_record
 from warp_mpm.output.figures.style import (
     GIGAPASCAL,
     MARK,
@@ -28,7 +28,9 @@ def front_figure(run: Run) -> Figure:
     Raises:
         NothingToDrawError: the scene has no line, or the run was killed.
     """
-    record = line_record(run)
+    record = step_record(run).line
+    if record is None:
+        raise NothingToDrawError("the scene names neither a line nor a front_path")
     lower, upper = pressure_range(run)
     distance = record.distance / MILLIMETRE
     figure = new_figure((5.6, 5.6))
@@ -53,19 +55,6 @@ def front_figure(run: Run) -> Figure:
     peak.set_ylim(bottom=0.0)
     draw_pressure_bar(figure, image, axes, cj_pressure(run), shrink=1.0)
     return figure
-
-
-def line_record(run: Run) -> LineRecord:
-    """The pressure along the line at every step.
-
-    Raises:
-        NothingToDrawError: the scene has no line, or the run was killed.
-    """
-    if run.steps is None:
-        raise NothingToDrawError("the run was killed, or goes on: it has left no record of its steps")
-    if run.steps.line is None:
-        raise NothingToDrawError("the scene names neither a line nor a front_path")
-    return run.steps.line
 
 
 def _even_times(record: LineRecord, rows: int = 1000) -> tuple[np.ndarray, np.ndarray]:

@@ -1,12 +1,13 @@
 """Drawing on the section plane: the window, the charge's first outline, detonators, labels of the axes."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
+from matplotlib.ticker import MaxNLocator
 
 from warp_mpm.detonators import Detonator, PlaneDetonator
 from warp_mpm.output.description import SceneDescription
@@ -17,6 +18,7 @@ from warp_mpm.run_directory import Run
 from warp_mpm.scene import Domain
 
 THIN_CELLS = 4  # a section with fewer cells across is a line, and drawn as profiles
+MOST_TICKS = 4  # along the lower edge of a panel, less one
 MARGIN = 0.03  # of what is shown, around it
 
 Window = tuple[float, float, float, float]  # left, right, bottom, top [mm]
@@ -63,12 +65,13 @@ def label_axes(panels: np.ndarray, setup: SceneDescription) -> None:
     first, second = (AXIS_NAMES[axis] for axis in setup.section.in_plane)
     for axes in panels[-1]:
         axes.set_xlabel(f"{first} [mm]")
+        axes.xaxis.set_major_locator(MaxNLocator(MOST_TICKS, steps=[1, 2, 2.5, 5, 10]))
     for axes in panels[:, 0]:
         axes.set_ylabel(f"{second} [mm]")
 
 
 def draw_detonators(axes: Axes, setup: SceneDescription, time: float = math.inf) -> None:
-    """Draw the detonators: filled once they are lit, hollow before."""
+    """Draw the detonators in the window of the axes: filled once they are lit, hollow before."""
     for detonator in setup.detonators:
         _draw_detonator(axes, detonator, setup.section.in_plane, MARK if detonator.time <= time else "none")
 
@@ -81,22 +84,24 @@ def _draw_detonator(axes: Axes, detonator: Detonator, in_plane: tuple[int, int],
         if along != (0.0, 0.0):
             axes.axline(at, (at[0] + along[0], at[1] + along[1]), color=MARK, linewidth=1.0)
         return
+    if not all(low <= x <= high for x, (low, high) in zip(at, (axes.get_xlim(), axes.get_ylim()), strict=True)):
+        return
     axes.plot(*at, "o", markersize=4.0, color=MARK, markerfacecolor=face, markeredgewidth=1.0, clip_on=False, zorder=5)
 
 
-def draw_outline(axes: Axes, run: Run, color: str = "white") -> None:
+def draw_outlines(panels: Iterable[Axes], run: Run, color: str = "white") -> None:
     """Where each charge was at first, if it does not fill the domain: the edge of the cells with particles."""
-    setup = setup_of(run)
-    if run.file is None:
-        return
-    plane = setup.section
-    for cells in charge_cells(run):
-        layer = int(np.clip((plane.coordinate - cells.lower[plane.axis]) / cells.spacing[plane.axis], 0, None))
-        occupied = np.take(cells.filled, min(layer, cells.filled.shape[plane.axis] - 1), axis=plane.axis)
-        centres = [cells.centres(axis) / MILLIMETRE for axis in plane.in_plane]
-        if occupied.any() and not occupied.all():
-            edge = occupied.astype(float)
-            axes.contour(*centres, edge.T, levels=[0.5], colors=color, linewidths=0.6, linestyles="--")
+    setup, axis = setup_of(run), setup_of(run).section.axis
+    outlines = []
+    for cells in charge_cells(run) if run.file is not None else ():
+        layer = (setup.section.coordinate - cells.lower[axis]) / cells.spacing[axis]
+        inside = np.take(cells.filled, np.clip(int(layer), 0, cells.filled.shape[axis] - 1), axis=axis)
+        if inside.any() and not inside.all():
+            u, v = (cells.centres(other) / MILLIMETRE for other in setup.section.in_plane)
+            outlines.append((u, v, inside.T.astype(float)))
+    for axes in panels:
+        for outline in outlines:
+            axes.contour(*outline, levels=[0.5], colors=color, linewidths=0.6, linestyles="--")
 
 
 def window_of(run: Run, seen: np.ndarray) -> Window:

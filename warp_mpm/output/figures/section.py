@@ -5,11 +5,11 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from warp_mpm.output import colormap
-from warp_mpm.output.figures.content import cj_pressure, pressure_range, section_pictures, setup_of
+from warp_mpm.output.figures.content import cj_pressure, faint_pressure, pressure_range, section_pictures, setup_of
 from warp_mpm.output.figures.plane import (
     draw_detonators,
     draw_nodes,
-    draw_outline,
+    draw_outlines,
     is_thin,
     label_axes,
     long_axis,
@@ -30,8 +30,6 @@ from warp_mpm.output.figures.style import (
 )
 from warp_mpm.run_directory import Run
 
-FAINT = 0.02  # share of the colour range below which gas is not worth showing
-
 
 def section_figure(run: Run) -> Figure:
     """A panel an instant; a domain that is only a few cells across is drawn as pressure profiles instead.
@@ -45,8 +43,7 @@ def section_figure(run: Run) -> Figure:
 def _panels(run: Run) -> Figure:
     setup, pictures = setup_of(run), section_pictures(run)
     lower, upper = pressure_range(run)
-    faint = lower + FAINT * (upper - lower)
-    window = window_of(run, np.max([picture.pressure for picture in pictures], axis=0) > faint)
+    window = window_of(run, np.max([picture.pressure for picture in pictures], axis=0) > faint_pressure(run))
     rows, columns, size = page(window, len(pictures))
     figure = new_figure(size)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
@@ -54,11 +51,11 @@ def _panels(run: Run) -> Figure:
     for number, (axes, picture) in enumerate(zip(panels.flat, pictures, strict=False)):
         values = picture.pressure / GIGAPASCAL
         image = draw_nodes(axes, setup, values, window, interpolation="bilinear", **scale)
-        draw_outline(axes, run)
         draw_detonators(axes, setup, picture.time)
         axes.set_title(panel_title(number, picture.time), pad=8.0)
     for axes in panels.flat[len(pictures) :]:
         axes.set_visible(False)
+    draw_outlines(panels.flat[: len(pictures)], run)
     label_axes(panels, setup)
     draw_pressure_bar(figure, image, panels, cj_pressure(run), shrink=0.8)
     return figure

@@ -1,0 +1,117 @@
+"""Pictures that move: the section, or the pressure in space, at every saved frame."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.animation import writers
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from warp_mpm.checks import mistake
+from warp_mpm.output import colormap
+from warp_mpm.output.figures.content import cj_pressure, faint_pressure, picture_frames, pressure_range, setup_of
+from warp_mpm.output.figures.field import SpacePanels
+from warp_mpm.output.figures.plane import draw_detonators, draw_nodes, draw_outlines, is_thin, label_axes, window_of
+from warp_mpm.output.figures.style import (
+    GIGAPASCAL,
+    MICROSECOND,
+    STYLE,
+    NothingToDrawError,
+    draw_pressure_bar,
+    new_figure,
+)
+from warp_mpm.output.saved_frames import SavedFrame
+from warp_mpm.output.whole_file import whole_file
+from warp_mpm.run_directory import Run
+
+PROGRAMS = {"gif": "pillow", "mp4": "ffmpeg"}
+FRAMES_PER_SECOND = 12
+DOTS_PER_INCH = 120
+HEIGHT = 4.6  # of the drawing [inch]
+
+Show = Callable[[SavedFrame], None]  # changes the figure to another instant
+
+
+def draw_film(run: Run, name: str, path: Path) -> None:
+    """Draw all frames of a run into one file.
+
+    Args:
+        run: with its frames.
+        name: "section" or "field".
+        path: the file to write; its suffix says which kind.
+
+    Raises:
+        InputError: an mp4 is wanted, and ffmpeg is not installed.
+        NothingToDrawError: the domain is a column.
+        SimulationError: the file cannot be written.
+    """
+    program = PROGRAMS[path.suffix.removeprefix(".")]
+    if not writers.is_available(program):
+        raise mistake("figures: --animate", "ffmpeg on the search path for mp4", "none", "install it, or choose gif")
+    if is_thin(setup_of(run)):
+        raise NothingToDrawError("the section is only a few cells across: see section.png")
+    with rc_context(STYLE):
+        figure, show = FILMS[name](run)
+        FigureCanvasAgg(figure)
+        show(run.frames[0])
+        figure.canvas.draw()
+        figure.set_layout_engine("none")  # nothing may move but what happens
+        writer = writers[program](fps=FRAMES_PER_SECOND)
+        with whole_file(path) as part:
+            part.parent.mkdir(parents=True, exist_ok=True)
+            with writer.saving(figure, str(part), DOTS_PER_INCH):
+                for frame in run.frames:
+                    show(frame)
+                    writer.grab_frame()
+
+
+def _section_film(run: Run) -> tuple[Figure, Show]:
+    setup = setup_of(run)
+    lower, upper = pressure_range(run)
+    window = window_of(run, np.max([frame.section for frame in run.frames], axis=0) > faint_pressure(run))
+    figure = _figure_for(window)
+    axes = figure.subplots()
+    scale = {"cmap": colormap.NAME, "vmin": lower / GIGAPASCAL, "vmax": upper / GIGAPASCAL}
+    image = draw_nodes(axes, setup, run.frames[0].section / GIGAPASCAL, window, interpolation="bilinear", **scale)
+    draw_outlines([axes], run)
+    label_axes(np.array([[axes]]), setup)
+    draw_pressure_bar(figure, image, axes, cj_pressure(run), shrink=0.9)
+
+    def show(frame: SavedFrame) -> None:
+        image.set_data(frame.section.T / GIGAPASCAL)
+        for line in list(axes.lines):
+            line.remove()
+        draw_detonators(axes, setup, frame.time)
+        axes.set_title(_instant(frame))
+
+    return figure, show
+
+
+def _field_film(run: Run) -> tuple[Figure, Show]:
+    panels = SpacePanels(run, picture_frames(run))
+    figure = _figure_for(panels.window)
+    axes = figure.subplots()
+    panels.draw_bar(figure, axes, shrink=0.9)
+
+    def show(frame: SavedFrame) -> None:
+        axes.clear()
+        panels.draw(axes, frame)
+        axes.set_title(_instant(frame))
+
+    return figure, show
+
+
+def _figure_for(window: tuple[float, float, float, float]) -> Figure:
+    shape = (window[3] - window[2]) / (window[1] - window[0])
+    figure = new_figure((HEIGHT * min(1.0 / shape, 2.0) + 1.6, HEIGHT * min(1.0, 2.0 * shape) + 0.8))
+    figure.set_layout_engine("compressed")  # nothing is cut off to fit, as in pictures
+    return figure
+
+
+def _instant(frame: SavedFrame) -> str:
+    return f"{frame.time / MICROSECOND:.1f} µs"
+
+
+FILMS: dict[str, Callable[[Run], tuple[Figure, Show]]] = {"section": _section_film, "field": _field_film}
