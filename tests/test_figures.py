@@ -6,19 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from PIL import Image
 from scenes_for_tests import OPEN, block
 
+from warp_mpm.cli import main
 from warp_mpm.config import Save
 from warp_mpm.errors import InputError, SimulationError
+from warp_mpm.output import colormap
 from warp_mpm.output.description import scene_values
-from warp_mpm.output.figures import PICTURES, draw_figures
+from warp_mpm.output.figures import PICTURES, draw_figures, render
 from warp_mpm.output.figures.charge import charge_figure
-from warp_mpm.output.figures.content import pressure_range
+from warp_mpm.output.figures.content import picture_frames, pressure_range
 from warp_mpm.output.figures.energy import energy_figure
-from warp_mpm.output.figures.field import field_figure
+from warp_mpm.output.figures.field import SpacePanels, field_figure
 from warp_mpm.output.figures.front import front_figure
 from warp_mpm.output.figures.gauges import gauges_figure
 from warp_mpm.output.figures.maps import arrival_figure, peak_figure
@@ -372,3 +375,39 @@ def test_an_unknown_picture_is_one_line(plate, tmp_path):
 def test_a_usd_file_alone_cannot_be_drawn(plate, tmp_path):
     with pytest.raises(InputError, match=r"expected a run directory whose summary\.json describes the scene"):
         draw_figures(load(plate.file), tmp_path)
+
+
+def test_smooth_surfaces_where_pyvista_can_draw_them(plate, tmp_path):
+    """The same silhouette, and colours between the same ones, as matplotlib's faces."""
+    pytest.importorskip("pyvista")
+    fault = render.fault()
+    if fault is not None:
+        pytest.skip(f"PyVista cannot draw here: {fault}")
+    space = SpacePanels(plate, picture_frames(plate), smooth=False)
+    corners = np.array([[[0, 0, 0.02], [0.1, 0, 0.02], [0.1, 0.4, 0.02], [0, 0.4, 0.02]]])  # the left half of the front
+    image = render.render(space.view, space.window, corners, values=np.array([2.0]), norm=Normalize(0.0, 4.0))
+    left, right, bottom, top = space.window
+    area = (image[..., 3] / 255.0).mean() * (right - left) * (top - bottom)
+    first, second = space.view.project(corners[0, [1, 3]] - corners[0, 0]) * 1e3
+    assert area == pytest.approx(abs(first[0] * second[1] - first[1] * second[0]), rel=5e-3)  # its edges are soft
+    middle = colormap.srgb_table()[127:129].mean(axis=0)
+    np.testing.assert_allclose(np.median(image[image[..., 3] == 255][:, :3], axis=0) / 255.0, middle, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("module", "reason"),
+    [("import os\nos.abort()", "signal 6"), ("raise OSError('no display')", "OSError: no display")],
+)
+def test_where_pyvista_cannot_draw_matplotlib_does(plate, tmp_path, monkeypatch, capsys, module, reason):
+    (tmp_path / "pyvista.py").write_text(module)
+    (tmp_path / "vtkmodules").mkdir()
+    (tmp_path / "vtkmodules" / "vtkCommonCore.py").write_text(
+        "class vtkLogger:\n    VERBOSITY_OFF = 0\n    SetStderrVerbosity = print\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(render, "is_installed", lambda: True)
+    assert main(["figures", str(plate.directory), "field", "-o", str(tmp_path / "figures")]) == 0
+    first, last = capsys.readouterr().out.splitlines()
+    assert first.startswith("PyVista cannot draw here (")
+    assert reason in first
+    assert last == f"field.png in {tmp_path / 'figures'}"

@@ -248,11 +248,17 @@ def _figures(options: argparse.Namespace) -> None:
     from warp_mpm.run_directory import FIGURES, load
 
     try:
-        from warp_mpm.output.figures import draw_figures
+        from warp_mpm.output.figures import draw_figures, render
     except ImportError as error:
         raise mistake("figures", "matplotlib", "none", "pip install matplotlib") from error
+    run = load(options.directory)
+    wants_pyvista = render.is_installed() and "field" in (options.names or ["field"])
+    fault = render.fault() if wants_pyvista else None
+    if fault is not None:
+        print(f"PyVista cannot draw here ({fault}): matplotlib draws the surfaces, coarser")
+    smooth = wants_pyvista and fault is None
     target = options.output if options.output is not None else options.directory / FIGURES
-    drawn, missing = draw_figures(load(options.directory), target, options.names, options.animate)
+    drawn, missing = draw_figures(run, target, options.names, options.animate, smooth)
     for name, reason in missing.items():
         print(f"{name}: not drawn, {reason}")
     print(f"{', '.join(drawn) or 'nothing'} in {target}")

@@ -38,7 +38,11 @@ PICTURES: dict[str, Callable[[Run], Figure]] = {
 
 
 def draw_figures(
-    run: Run, directory: Path, names: Sequence[str] = (), animate: Literal["gif", "mp4"] | None = None
+    run: Run,
+    directory: Path,
+    names: Sequence[str] = (),
+    animate: Literal["gif", "mp4"] | None = None,
+    smooth: bool = False,
 ) -> tuple[list[str], dict[str, str]]:
     """Draw pictures of a run, each as `<name>.png` in a directory.
 
@@ -47,6 +51,7 @@ def draw_figures(
         directory: made if need be.
         names: of pictures; all if there are none.
         animate: also draw those of them that can move at every frame, into files of this kind.
+        smooth: let PyVista draw surfaces in space, if `render.fault` has nothing against it.
 
     Returns:
         The files that were drawn; and the names of those that could not be, with the reason.
@@ -61,9 +66,9 @@ def draw_figures(
             raise mistake("figures", f"any of {', '.join(PICTURES)}", repr(name))
     wanted: dict[str, Callable[[Path], None]] = {}
     for name in names or PICTURES:
-        wanted[f"{name}.png"] = partial(_draw_picture, run, name)
+        wanted[f"{name}.png"] = partial(_draw_picture, run, name, smooth)
         if animate is not None and name in FILMS:
-            wanted[f"{name}.{animate}"] = partial(draw_film, run, name)
+            wanted[f"{name}.{animate}"] = partial(draw_film, run, name, smooth)
     missing: dict[str, str] = {}
     for file, draw in wanted.items():
         try:
@@ -73,6 +78,7 @@ def draw_figures(
     return [file for file in wanted if file not in missing], missing
 
 
-def _draw_picture(run: Run, name: str, path: Path) -> None:
+def _draw_picture(run: Run, name: str, smooth: bool, path: Path) -> None:
+    draw = partial(field_figure, smooth=smooth) if name == "field" else PICTURES[name]
     with rc_context(STYLE):
-        save(PICTURES[name](run), path)
+        save(draw(run), path)

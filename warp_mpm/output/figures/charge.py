@@ -87,7 +87,7 @@ def _label_box(axes: Axes, view: View, lower: np.ndarray, upper: np.ndarray) -> 
         x, y = max((edge.mean(axis=0) for edge in edges), key=lambda at: _outwards(at - middle))
         direction = view.project(np.eye(3)[axis])
         turn = np.degrees(np.arctan2(direction[1], direction[0]))
-        turn = (turn + 90.0) % 180.0 - 90.0
+        turn = (turn + 89.0) % 180.0 - 89.0  # text upright, or reading upwards
         away = np.array([x, y]) - middle
         across = np.array([-direction[1], direction[0]]) / np.linalg.norm(direction)
         offset = 9.0 * across * np.sign(across @ away)

@@ -20,6 +20,7 @@ from warp_mpm.output.figures.content import (
     setup_of,
 )
 from warp_mpm.output.figures.plane import is_thin, page
+from warp_mpm.output.figures.render import render
 from warp_mpm.output.figures.space import (
     EDGE,
     corners_of,
@@ -46,7 +47,7 @@ from warp_mpm.scene import Wall
 DENSE = 0.5  # of the matter that a full cell has at the start: what has less is gas
 
 
-def field_figure(run: Run) -> Figure:
+def field_figure(run: Run, smooth: bool = False) -> Figure:
     """A panel an instant, at the frames nearest to the instants; see `SpacePanels`.
 
     Raises:
@@ -55,7 +56,7 @@ def field_figure(run: Run) -> Figure:
     if is_thin(setup_of(run)):
         raise NothingToDrawError("the section is only a few cells across: see section.png")
     frames = picture_frames(run)
-    space = SpacePanels(run, frames)
+    space = SpacePanels(run, frames, smooth)
     rows, columns, size = page(space.window, len(frames))
     figure = new_figure(size)
     panels = figure.subplots(rows, columns, squeeze=False)
@@ -77,9 +78,10 @@ class SpacePanels:
     next to no pressure is left out.
     """
 
-    def __init__(self, run: Run, frames: Sequence[SavedFrame]) -> None:
-        """Choose the window that shows all there is to see in some frames."""
+    def __init__(self, run: Run, frames: Sequence[SavedFrame], smooth: bool) -> None:
+        """Choose the window that shows all there is to see in some frames; `smooth` takes PyVista."""
         self._run = run
+        self._smooth = smooth
         self._setup = setup_of(run)
         self._box = np.array(charge_box(run))
         self._thick = is_thick(run)
@@ -102,7 +104,11 @@ class SpacePanels:
         body = self._bodies.get(frame.index) or self._shown(frame)
         corners, pressure, _ = surface_of(body, self.view, body.pressure)
         values = pressure / GIGAPASCAL
-        draw_faces(axes, self.view, corners, array=values, cmap=colormap.NAME, norm=self._scale)
+        if self._smooth:
+            image = render(self.view, self.window, corners, values=values, norm=self._scale)
+            axes.imshow(image, extent=self.window, interpolation="antialiased")
+        else:
+            draw_faces(axes, self.view, corners, array=values, cmap=colormap.NAME, norm=self._scale)
         if not self._open and not self._thick:  # before the wave comes there is nothing else to see
             domain = self._setup.domain
             edges, _ = box_edges(np.array(domain.lower), np.array(domain.upper), self.view)

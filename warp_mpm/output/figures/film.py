@@ -34,12 +34,13 @@ HEIGHT = 4.6  # of the drawing [inch]
 Show = Callable[[SavedFrame], None]  # changes the figure to another instant
 
 
-def draw_film(run: Run, name: str, path: Path) -> None:
+def draw_film(run: Run, name: str, smooth: bool, path: Path) -> None:
     """Draw all frames of a run into one file.
 
     Args:
         run: with its frames.
         name: "section" or "field".
+        smooth: whether PyVista draws the surfaces of "field".
         path: the file to write; its suffix says which kind.
 
     Raises:
@@ -53,7 +54,7 @@ def draw_film(run: Run, name: str, path: Path) -> None:
     if is_thin(setup_of(run)):
         raise NothingToDrawError("the section is only a few cells across: see section.png")
     with rc_context(STYLE):
-        figure, show = FILMS[name](run)
+        figure, show = FILMS[name](run, smooth)
         FigureCanvasAgg(figure)
         show(run.frames[0])
         figure.canvas.draw()
@@ -67,7 +68,7 @@ def draw_film(run: Run, name: str, path: Path) -> None:
                     writer.grab_frame()
 
 
-def _section_film(run: Run) -> tuple[Figure, Show]:
+def _section_film(run: Run, _: bool) -> tuple[Figure, Show]:
     setup = setup_of(run)
     lower, upper = pressure_range(run)
     window = window_of(run, np.max([frame.section for frame in run.frames], axis=0) > faint_pressure(run))
@@ -89,8 +90,8 @@ def _section_film(run: Run) -> tuple[Figure, Show]:
     return figure, show
 
 
-def _field_film(run: Run) -> tuple[Figure, Show]:
-    panels = SpacePanels(run, picture_frames(run))
+def _field_film(run: Run, smooth: bool) -> tuple[Figure, Show]:
+    panels = SpacePanels(run, picture_frames(run), smooth)
     figure = _figure_for(panels.window)
     axes = figure.subplots()
     panels.draw_bar(figure, axes, shrink=0.9)
@@ -114,4 +115,4 @@ def _instant(frame: SavedFrame) -> str:
     return f"{frame.time / MICROSECOND:.1f} µs"
 
 
-FILMS: dict[str, Callable[[Run], tuple[Figure, Show]]] = {"section": _section_film, "field": _field_film}
+FILMS: dict[str, Callable[[Run, bool], tuple[Figure, Show]]] = {"section": _section_film, "field": _field_film}

@@ -80,11 +80,13 @@ def arrival_figure(run: Run) -> Figure:
         return _profile(run, arrival, "arrival of the front [µs]", expected)
     figure, axes = _map(run, came)
     image = _draw_values(axes, run, arrival, cmap=_arrival_colors(), vmin=0.0, vmax=last)
-    levels = MaxNLocator(ISOCHRONES, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, last)
+    levels = MaxNLocator(ISOCHRONES, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, last)[1:]
     if expected is not None:
         style = {"colors": "white", "linewidths": 1.8}
         _draw_lines(axes, setup, expected, levels, **style)
-        axes.plot([], [], color="0.8", linewidth=1.8, label=f"D = {run.summary['detonation_speed_m_s']:.0f} m/s")
+        axes.plot(
+            [], [], color="0.8", linewidth=1.8, label=f"at D = {run.summary['detonation_speed_m_s']:.0f} m/s (white)"
+        )
     lines = _draw_lines(axes, setup, arrival, levels, colors="black", linewidths=0.8)
     axes.plot([], [], color="black", linewidth=0.8, label="computed")
     axes.clabel(lines, fontsize=7.0, fmt="%g")
