@@ -8,6 +8,8 @@ from warp_mpm.output.figures.content import frames_of, setup_of
 from warp_mpm.output.saved_frames import SavedFrame
 from warp_mpm.run_directory import Run
 
+FEW = 3.0  # particles to a cell on average, so that hardly any is empty by chance
+
 
 @dataclass(frozen=True)
 class Cells:
@@ -65,8 +67,12 @@ def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
 
 
 def _merged(run: Run) -> int:
-    """Cells to an edge of a counting cell, so that each holds a particle where matter is as dense as at the start."""
-    return max(1, int(np.ceil(np.cbrt(_particle_volume(run) / setup_of(run).domain.cell_volume) - 1e-6)))
+    """Cells to an edge of a counting cell, so that each holds a particle where matter is as dense as at the start.
+
+    Particles of which only some were saved lie unevenly, so more of them must come to a cell.
+    """
+    wanted = 1.0 if len(run.frames.ids) == run.summary["particles"] else FEW
+    return max(1, int(np.ceil(np.cbrt(wanted * _particle_volume(run) / setup_of(run).domain.cell_volume) - 1e-6)))
 
 
 def _particle_volume(run: Run) -> float:
