@@ -54,9 +54,9 @@ def joined(parts: list[Cells]) -> tuple[Cells, np.ndarray]:
 
 def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
     domain = setup_of(run).domain
-    lower, merged = np.array(domain.lower), _merged(run)
-    spacing = merged * np.array(domain.spacing)
-    shape = np.ceil(np.array(domain.cells) / merged).astype(int)
+    lower = np.array(domain.lower)
+    shape = np.maximum(np.array(domain.cells) // _merged(run), 1)
+    spacing = (np.array(domain.upper) - lower) / shape
     cell = np.clip(((position - lower) / spacing).astype(int), 0, shape - 1)
     flat = np.ravel_multi_index(tuple(cell.T), tuple(shape))
     count = np.bincount(flat, minlength=shape.prod())
@@ -67,7 +67,7 @@ def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
 
 
 def _merged(run: Run) -> int:
-    """Cells to an edge of a counting cell, so that each holds a particle where matter is as dense as at the start.
+    """Cells to an edge of a counting cell, at least: each then holds a particle where matter is as dense as at the start.
 
     Particles of which only some were saved lie unevenly, so more of them must come to a cell.
     """
