@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.colors import Normalize
+from matplotlib import rcParams
+from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from PIL import Image
@@ -27,7 +28,7 @@ from warp_mpm.output.figures.gauges import gauges_figure
 from warp_mpm.output.figures.maps import arrival_figure, peak_figure
 from warp_mpm.output.figures.particles import particles_figure
 from warp_mpm.output.figures.section import section_figure
-from warp_mpm.output.figures.style import save
+from warp_mpm.output.figures.style import MARK, save
 from warp_mpm.output.frame import Frame, LineRecord, SectionPicture, SectionRecord, StepRecord
 from warp_mpm.output.steps import write_steps
 from warp_mpm.output.tables import HistoryWriter, write_summary
@@ -358,10 +359,16 @@ def test_a_film_has_every_frame(plate, tmp_path):
     assert drawn == ["section.png", "section.gif"]
     with Image.open(tmp_path / "section.gif") as film:
         assert film.n_frames == len(plate.frames)
+        film.seek(plate.frames.nearest(40e-6).index)
+        pixels = np.asarray(film.convert("RGB"), dtype=float).reshape(-1, 3) / 255.0
+    shown = np.unique(pixels[np.ptp(pixels, axis=1) > 0.1], axis=0)  # no greys
+    colors = np.vstack([colormap.srgb_table(), to_rgb(MARK)])
+    assert np.abs(shown[:, None] - colors).max(axis=2).min(axis=1).max() < 0.005  # half a step of 1/255 at most
+    assert len(shown) > 50
 
 
 def test_mp4_needs_ffmpeg(plate, tmp_path, monkeypatch):
-    monkeypatch.setattr("matplotlib.animation.FFMpegWriter.bin_path", lambda: "no-such-program")
+    monkeypatch.setitem(rcParams, "animation.ffmpeg_path", "no-such-program")
     with pytest.raises(InputError, match="ffmpeg") as caught:
         draw_figures(plate, tmp_path, ["field"], animate="mp4")
     assert "\n" not in str(caught.value)

@@ -67,7 +67,7 @@ def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
 
 
 def _merged(run: Run) -> int:
-    """Cells to an edge of a counting cell, at least: each then holds a particle where matter is as dense as at the start.
+    """Cells to an edge of a counting cell, at least: each then holds a particle of matter as dense as at the start.
 
     Particles of which only some were saved lie unevenly, so more of them must come to a cell.
     """
