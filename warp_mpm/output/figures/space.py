@@ -43,7 +43,7 @@ def draw_detonators(axes: Axes, view: View, setup: SceneDescription, box: np.nda
     for detonator in setup.detonators:
         lit = detonator.time <= time
         if isinstance(detonator, PlaneDetonator):
-            outline = _plane_in_box(np.array(detonator.position), np.array(detonator.normal), box)
+            outline = plane_in_box(np.array(detonator.position), np.array(detonator.normal), box)
             if len(outline):
                 at = view.project(np.vstack([outline, outline[:1]])) / MILLIMETRE
                 axes.plot(*at.T, color=MARK, linewidth=1.0, linestyle="-" if lit else ":")
@@ -97,7 +97,7 @@ def _round_below(length: float) -> float:
     return max(step * power for step in ROUND if step * power <= length)
 
 
-def _plane_in_box(point: np.ndarray, normal: np.ndarray, box: np.ndarray) -> np.ndarray:
+def plane_in_box(point: np.ndarray, normal: np.ndarray, box: np.ndarray) -> np.ndarray:
     """The polygon (n, 3) in which a plane cuts a box (2, 3); empty if it does not."""
     lower, upper = box
     cuts = []
