@@ -6,76 +6,32 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib import rcParams
-from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
-from PIL import Image
+from runs_for_tests import GAUGES, GPA, first_frame, left_by, run_of
 from scenes_for_tests import OPEN, block
 
-from warp_mpm.cli import main
 from warp_mpm.config import Save
 from warp_mpm.errors import InputError, SimulationError
-from warp_mpm.output import colormap
 from warp_mpm.output.description import scene_values
-from warp_mpm.output.figures import PICTURES, draw_figures, render
+from warp_mpm.output.figures import PICTURES, draw_figures
 from warp_mpm.output.figures.charge import charge_figure
-from warp_mpm.output.figures.content import picture_frames, pressure_range
+from warp_mpm.output.figures.content import pressure_range
 from warp_mpm.output.figures.energy import energy_figure
-from warp_mpm.output.figures.field import SpacePanels, field_figure
+from warp_mpm.output.figures.field import field_figure
 from warp_mpm.output.figures.front import front_figure
 from warp_mpm.output.figures.gauges import gauges_figure
 from warp_mpm.output.figures.maps import arrival_figure, peak_figure
 from warp_mpm.output.figures.particles import particles_figure
 from warp_mpm.output.figures.section import section_figure
-from warp_mpm.output.figures.style import MARK, save
-from warp_mpm.output.frame import Frame, LineRecord, SectionPicture, SectionRecord, StepRecord
-from warp_mpm.output.steps import write_steps
-from warp_mpm.output.tables import HistoryWriter, write_summary
-from warp_mpm.output.usd import UsdWriter
+from warp_mpm.output.figures.style import save
+from warp_mpm.output.frame import LineRecord, SectionPicture
+from warp_mpm.output.tables import write_summary
 from warp_mpm.progress import Silent
 from warp_mpm.run_directory import Run, load
 from warp_mpm.scene import Scene
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import simulate
-
-GPA = 1e9
-GAUGES = """time_s,a_pressure_pa,a_velocity_x_m_s,a_velocity_y_m_s,a_velocity_z_m_s,a_density_kg_m3,b_pressure_pa,\
-b_velocity_x_m_s,b_velocity_y_m_s,b_velocity_z_m_s,b_density_kg_m3
-0.0,0.0,0.0,0.0,0.0,1000.0,1e9,0.0,0.0,0.0,1000.0
-1e-06,2e9,3.0,0.0,4.0,1200.0,1e9,0.0,0.0,0.0,1000.0
-3e-06,1e9,6.0,0.0,8.0,1100.0,1e9,0.0,0.0,0.0,1000.0
-"""
-
-
-def left_by(directory, scene: Scene, *, pictures=(), line=None, history=(), frames=(), arrival=np.nan) -> Run:
-    """A run directory with made-up results of a scene."""
-    write_summary(directory / "summary.json", {"status": "complete", **scene_values(scene)})
-    nodes = [scene.domain.cells[axis] + 1 for axis in scene.section.in_plane]
-    highest = np.max([picture.pressure for picture in pictures], axis=0) if pictures else np.zeros(nodes)
-    section = SectionRecord(highest, np.full(nodes, arrival))
-    time = np.zeros(1) if line is None else line.time
-    peaks = np.zeros(len(time), np.float32)
-    record = StepRecord(time, peaks, peaks, peaks, None, np.zeros((len(time), 0)), None, line, section)
-    write_steps(directory / "steps.npz", record, pictures)
-    if history:
-        with HistoryWriter(directory / "history.csv", list(history[0])) as table:
-            for row in history:
-                table.write(row)
-    if frames:
-        path = directory / f"{scene.name}.usdc"
-        with UsdWriter(path, scene, pressure_range=(0.0, GPA), frames=max(len(frames), 2)) as usd:
-            for frame in frames:
-                usd.write(frame)
-    return load(directory)
-
-
-def first_frame(scene: Scene) -> Frame:
-    """The particles where they are at the start."""
-    position = np.concatenate([charge.positions for charge in scene.charges]).astype(np.float32)
-    section = np.zeros([scene.domain.cells[axis] + 1 for axis in scene.section.in_plane], np.float32)
-    count = scene.particle_count
-    return Frame(0, 0.0, position, np.zeros(count, np.float32), np.ones(count, bool), section)
 
 
 def pictures_of(scene: Scene, count: int = 6) -> list[SectionPicture]:
@@ -239,13 +195,6 @@ def test_colors_reach_the_highest_pressure_but_not_far_beyond_the_fronts(scene, 
     assert panels_of(figure)[0].images[0].get_clim() == pytest.approx((0.0, limit), rel=1e-4)
 
 
-def run_of(directory, **settings) -> Run:
-    """A real run of a small plate, lit at both ends, without pictures."""
-    scene = load_scene("two_point", cell_size=2e-2, **settings)
-    simulate(scene, save=Save(frames=12, figures=False), output=directory)
-    return load(directory)
-
-
 @pytest.fixture(scope="module")
 def plate(tmp_path_factory) -> Run:
     return run_of(tmp_path_factory.mktemp("plate"))
@@ -273,7 +222,7 @@ def test_without_usd_what_is_left_is_drawn(plate, tmp_path):
         shutil.copy(plate.directory / name, tmp_path / name)
     drawn, missing = draw_figures(load(tmp_path), tmp_path / "figures")
     assert set(drawn) == {"section.png", "front.png", "peak.png", "arrival.png", "energy.png"}
-    assert missing["field.png"] == "the USD file with the frames is gone"
+    assert missing["field.png"] == "the frames are gone"
 
 
 def test_an_interrupted_run_is_drawn(tmp_path):
@@ -354,26 +303,6 @@ def test_gauges_are_shown_with_their_impulse(scene, tmp_path):
     np.testing.assert_allclose(speed.lines[0].get_ydata(), [0.0, 5.0, 10.0])
 
 
-def test_a_film_has_every_frame(plate, tmp_path):
-    drawn, _ = draw_figures(plate, tmp_path, ["section"], animate="gif")
-    assert drawn == ["section.png", "section.gif"]
-    with Image.open(tmp_path / "section.gif") as film:
-        assert film.n_frames == len(plate.frames)
-        film.seek(plate.frames.nearest(40e-6).index)
-        pixels = np.asarray(film.convert("RGB"), dtype=float).reshape(-1, 3) / 255.0
-    shown = np.unique(pixels[np.ptp(pixels, axis=1) > 0.1], axis=0)  # no greys
-    colors = np.vstack([colormap.srgb_table(), to_rgb(MARK)])
-    assert np.abs(shown[:, None] - colors).max(axis=2).min(axis=1).max() < 0.005  # half a step of 1/255 at most
-    assert len(shown) > 50
-
-
-def test_mp4_needs_ffmpeg(plate, tmp_path, monkeypatch):
-    monkeypatch.setitem(rcParams, "animation.ffmpeg_path", "no-such-program")
-    with pytest.raises(InputError, match="ffmpeg") as caught:
-        draw_figures(plate, tmp_path, ["field"], animate="mp4")
-    assert "\n" not in str(caught.value)
-
-
 def test_an_unknown_picture_is_one_line(plate, tmp_path):
     with pytest.raises(InputError, match=r"expected any of charge, .*, got 'feild'"):
         draw_figures(plate, tmp_path, ["feild"])
@@ -384,37 +313,19 @@ def test_a_usd_file_alone_cannot_be_drawn(plate, tmp_path):
         draw_figures(load(plate.file), tmp_path)
 
 
-def test_smooth_surfaces_where_pyvista_can_draw_them(plate, tmp_path):
-    """The same silhouette, and colours between the same ones, as matplotlib's faces."""
-    pytest.importorskip("pyvista")
-    fault = render.fault()
-    if fault is not None:
-        pytest.skip(f"PyVista cannot draw here: {fault}")
-    space = SpacePanels(plate, picture_frames(plate), smooth=False)
-    corners = np.array([[[0, 0, 0.02], [0.1, 0, 0.02], [0.1, 0.4, 0.02], [0, 0.4, 0.02]]])  # the left half of the front
-    image = render.render(space.view, space.window, corners, values=np.array([2.0]), norm=Normalize(0.0, 4.0))
-    left, right, bottom, top = space.window
-    area = (image[..., 3] / 255.0).mean() * (right - left) * (top - bottom)
-    first, second = space.view.project(corners[0, [1, 3]] - corners[0, 0]) * 1e3
-    assert area == pytest.approx(abs(first[0] * second[1] - first[1] * second[0]), rel=5e-3)  # its edges are soft
-    middle = colormap.srgb_table()[127:129].mean(axis=0)
-    np.testing.assert_allclose(np.median(image[image[..., 3] == 255][:, :3], axis=0) / 255.0, middle, atol=0.02)
+def test_a_run_that_ends_before_its_pictures_shows_its_last_frame(tmp_path):
+    run = run_of(tmp_path, end_time=4e-6)
+    (panel,) = panels_of(section_figure(run))
+    assert panel.get_title() == "(a)  4.0 µs"
+    np.testing.assert_allclose(panel.images[0].get_array(), run.frames[-1].section.T / GPA)
 
 
-@pytest.mark.parametrize(
-    ("module", "reason"),
-    [("import os\nos.abort()", "signal 6"), ("raise OSError('no display')", "OSError: no display")],
-)
-def test_where_pyvista_cannot_draw_matplotlib_does(plate, tmp_path, monkeypatch, capsys, module, reason):
-    (tmp_path / "pyvista.py").write_text(module)
-    (tmp_path / "vtkmodules").mkdir()
-    (tmp_path / "vtkmodules" / "vtkCommonCore.py").write_text(
-        "class vtkLogger:\n    VERBOSITY_OFF = 0\n    SetStderrVerbosity = print\n"
-    )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(render, "is_installed", lambda: True)
-    assert main(["figures", str(plate.directory), "field", "-o", str(tmp_path / "figures")]) == 0
-    first, last = capsys.readouterr().out.splitlines()
-    assert first.startswith("PyVista cannot draw here (")
-    assert reason in first
-    assert last == f"field.png in {tmp_path / 'figures'}"
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("scene", [block((6, 6, 6), walls=OPEN, margin_cells=2), block((1, 1, 30))])
+def test_other_bodies_are_drawn(scene, tmp_path):
+    """A thick one that is cut open, and a column whose section is a line."""
+    frame = first_frame(scene)
+    run = left_by(tmp_path, scene, pictures=[SectionPicture(0.0, frame.section)], frames=[frame])
+    drawn, _ = draw_figures(run, tmp_path / "figures")
+    assert {"charge.png", "particles.png", "section.png", "peak.png"} <= set(drawn)
+    assert ("field.png" in drawn) == (scene.domain.cells[0] > 1)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # the reader of frames needs pxr
 
 SUMMARY, HISTORY, STEPS, GAUGES = "summary.json", "history.csv", "steps.npz", "gauges.csv"
 FIGURES = "figures"  # directory
-USD_SUFFIXES = (".usdc", ".usda", ".usdz", ".usd")  # the first that is there has the frames
+USD_SUFFIXES = (".usdc", ".usda", ".usdz", ".usd")  # in the order in which they are looked for
 
 
 def load(path: str | Path) -> "Run":
@@ -42,7 +42,7 @@ def load(path: str | Path) -> "Run":
     if not path.is_dir():
         got = f"{str(path)!r}, which " + ("is neither" if path.exists() else "does not exist")
         raise mistake("load", "a run directory or a USD file", got)
-    run = Run(path, _usd_file(path))
+    run = Run(path, next(iter(usd_files(path)), None))
     if not run.summary and run.file is None:
         raise mistake("load", f"a run directory, with {SUMMARY} or a USD file", f"{str(path)!r}, which has neither")
     return run
@@ -147,8 +147,7 @@ class Run:
         return dict(zip(header, columns, strict=True))
 
 
-def _usd_file(directory: Path) -> Path | None:
-    """The USD file of a run directory: the merged one if it is there, else the root layer of the clips."""
+def usd_files(directory: Path) -> list[Path]:
+    """The whole USD files of a directory, a merged one first; not what a killed run left half written."""
     files = [file for suffix in USD_SUFFIXES for file in sorted(directory.glob(f"*{suffix}"))]
-    whole = [file for file in files if not file.stem.endswith(".part")]
-    return whole[0] if whole else None
+    return [file for file in files if not file.stem.endswith(".part")]

@@ -30,30 +30,24 @@ def setup_of(run: Run) -> SceneDescription:
 
 
 def section_pictures(run: Run) -> tuple[SectionPicture, ...]:
-    """The section at the scene's picture instants; of a killed run, at the frames nearest to them.
+    """The section at the scene's picture instants; without a record of them, at the frames nearest to them.
 
     Raises:
-        NothingToDrawError: the run did not get as far as the first of them.
+        NothingToDrawError: there are neither pictures nor frames.
     """
-    if run.pictures:
-        return run.pictures
-    frames = picture_frames(run)
-    return tuple(SectionPicture(frame.time, frame.section) for frame in frames)
+    return run.pictures or tuple(SectionPicture(frame.time, frame.section) for frame in picture_frames(run))
 
 
 def picture_frames(run: Run) -> list[SavedFrame]:
-    """The frames nearest to the scene's picture instants, each once.
+    """The frames nearest to the scene's picture instants, each once; the last one if the run did not get that far.
 
     Raises:
-        NothingToDrawError: the run did not get as far as the first of them, or its frames are gone.
+        NothingToDrawError: the frames are gone.
     """
-    times = frames_of(run).times
-    step = float(np.diff(times).max(initial=0.0))
-    instants = [time for time in setup_of(run).picture_times if time <= times[-1] + 0.5 * step]
-    frames = {frame.index: frame for frame in map(run.frames.nearest, instants)}
-    if not frames:
-        raise NothingToDrawError("the run did not get as far as its first picture")
-    return list(frames.values())
+    frames = frames_of(run)
+    step = float(np.diff(frames.times).max(initial=0.0))
+    instants = [time for time in setup_of(run).picture_times if time <= frames.times[-1] + 0.5 * step]
+    return list({frame.index: frame for frame in map(frames.nearest, instants or frames.times[-1:])}.values())
 
 
 def frames_of(run: Run) -> Frames:
@@ -62,8 +56,8 @@ def frames_of(run: Run) -> Frames:
     Raises:
         NothingToDrawError: they are gone.
     """
-    if run.file is None:
-        raise NothingToDrawError("the USD file with the frames is gone")
+    if run.file is None or len(run.frames) == 0:
+        raise NothingToDrawError("the frames are gone")
     return run.frames
 
 
@@ -89,9 +83,11 @@ def pressure_range(run: Run) -> tuple[float, float]:
     Zero, and what nearly everything stays below on the section at the instants of its pictures and along the line; at
     most `COLOR_LIMIT`.
     """
-    shown = [picture.pressure for picture in section_pictures(run)]
+    shown = [picture.pressure for picture in section_pictures(run)] if run.pictures or run.file is not None else []
     if run.steps is not None and run.steps.line is not None:
         shown.append(run.steps.line.pressure)
+    if not shown:
+        shown.append(step_record(run).section.peak)
     return range_of(shown, cj_pressure(run))
 
 

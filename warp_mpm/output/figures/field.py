@@ -51,7 +51,7 @@ def field_figure(run: Run, smooth: bool = False) -> Figure:
     """A panel an instant, at the frames nearest to the instants; see `SpacePanels`.
 
     Raises:
-        NothingToDrawError: the run did not get as far as its first picture, or the domain is a column.
+        NothingToDrawError: the domain is a column, or the frames are gone.
     """
     if is_thin(setup_of(run)):
         raise NothingToDrawError("the section is only a few cells across: see section.png")

@@ -33,10 +33,10 @@ def gauges_figure(run: Run) -> Figure:
         curves = (pressure / GIGAPASCAL, impulse / KILOPASCAL_SECOND, speed)
         for axes, curve in zip(panels, curves, strict=True):
             axes.plot(time / MICROSECOND, curve, color=color, linestyle=line, linewidth=1.1, label=name)
+    draw_cj_line(panels[0], cj_pressure(run))
     for axes, label in zip(panels, ("pressure [GPa]", "impulse [kPa s]", "speed [m/s]"), strict=True):
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0)
-    draw_cj_line(panels[0], cj_pressure(run))
     panels[-1].set_xlim(time[0] / MICROSECOND, time[-1] / MICROSECOND)
     panels[-1].set_xlabel("time [µs]")
     handles, labels = panels[0].get_legend_handles_labels()

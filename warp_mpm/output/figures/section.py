@@ -35,7 +35,7 @@ def section_figure(run: Run) -> Figure:
     """A panel an instant; a domain that is only a few cells across is drawn as pressure profiles instead.
 
     Raises:
-        NothingToDrawError: the run did not get as far as its first picture.
+        NothingToDrawError: there are neither pictures nor frames.
     """
     return _profiles(run) if is_thin(setup_of(run)) else _panels(run)
 
