@@ -16,6 +16,7 @@ from warp_mpm.output.steps import read_steps, write_steps
 from warp_mpm.output.tables import write_summary
 from warp_mpm.output.usd import UsdWriter
 from warp_mpm.progress import Silent
+from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import Result
 
 SCENE = block((6, 4, 3), end_time=2e-5)
@@ -183,11 +184,19 @@ def test_a_run_in_the_same_place_is_not_the_old_one(tmp_path):
     assert old is None
 
 
+def test_the_description_of_a_shipped_scene_comes_back():
+    scene = load_scene("two_point", cell_size=2e-2)
+    setup = description_from_json(json.loads(json.dumps(scene_values(scene)["setup"])))
+    assert len(setup.gauges) > 0
+    for name in ("front_path", "line", "collision_points", "gauges"):
+        assert getattr(setup, name) == getattr(scene, name)
+
+
 @pytest.mark.parametrize("detonator", [PointDetonator((0.0, 0.0, 0.0), 1e-6), PlaneDetonator((0, 0, 0), (1, 0, 0))])
 def test_a_description_comes_back(detonator):
     scene = block((6, 4, 3), detonators=(detonator,))
     setup = description_from_json(json.loads(json.dumps(scene_values(scene)["setup"])))
-    for name in ("domain", "walls", "section", "detonators", "line", "picture_times", "end_time"):
+    for name in ("domain", "walls", "section", "detonators", "line", "picture_times", "gauges", "end_time"):
         assert getattr(setup, name) == getattr(scene, name)
 
 

@@ -92,7 +92,7 @@ def test_the_edges_of_a_box(view):
 @pytest.mark.parametrize("corner", [None, np.array([0.5, 0.0, 0.0])])
 def test_taking_away_what_is_in_front(corner):
     setup = SceneDescription(
-        *("", Domain((0, 0, 0), (1, 1, 1), (4, 4, 4)), Walls(), SectionPlane(2, 0.5)), (), None, None, (), (), 1.0
+        *("", Domain((0, 0, 0), (1, 1, 1), (4, 4, 4)), Walls(), SectionPlane(2, 0.5)), (), None, None, (), (), (), 1.0
     )
     view = view_of(setup.section, thick=corner is not None)
     filled = np.ones((4, 4, 4), dtype=bool)

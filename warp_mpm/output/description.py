@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from warp_mpm.detonators import Detonator, PlaneDetonator, PointDetonator
-from warp_mpm.scene import Charge, Domain, Scene, SectionPlane, Segment, Vector, Wall, Walls
+from warp_mpm.scene import Charge, Domain, Gauge, Scene, SectionPlane, Segment, Vector, Wall, Walls
 from warp_mpm.summary import theory
 
 DETONATORS: dict[str, type[Detonator]] = {"point": PointDetonator, "plane": PlaneDetonator}
@@ -24,6 +24,7 @@ class SceneDescription:
     line: Segment | None
     collision_points: tuple[Vector, ...]
     picture_times: tuple[float, ...]
+    gauges: tuple[Gauge, ...]
     end_time: float
 
     def as_json(self) -> dict[str, Any]:
@@ -64,6 +65,7 @@ def description_from_json(values: Mapping[str, Any]) -> SceneDescription:
         line=_segment(values["line"]),
         collision_points=_tuples(values["collision_points"]),
         picture_times=_tuples(values["picture_times"]),
+        gauges=tuple(Gauge(**_tuples(item)) for item in values["gauges"]),
         end_time=float(values["end_time"]),
     )
 

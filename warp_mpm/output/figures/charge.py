@@ -25,11 +25,12 @@ from warp_mpm.scene import Wall
 
 TINTS = ("#e4cf9f", "#b4c8de", "#d3b9d6", "#bcd6b8", "#d9b8a6")  # of charges, light enough for what is written on them
 SHADES = {"in front": 1.0, "beside": 0.84, "above": 0.93}  # of faces, by where they look
+GAUGE = "#b5367a"  # their crosses and names
 SIZE = 4.6  # of the longer side of the drawing [inch]
 
 
 def charge_figure(run: Run) -> Figure:
-    """The charges in space, with the box around them in mm, and each detonator with the time at which it is lit.
+    """The charges in space, with the box around them in mm, the gauges, and each detonator with its time.
 
     Raises:
         NothingToDrawError: the frames of the run are gone.
@@ -52,6 +53,7 @@ def charge_figure(run: Run) -> Figure:
         draw_edges(axes, view, line, colors="0.35", linewidths=0.7, linestyles=(0, (8, 3, 1, 3)))
     draw_detonators(axes, view, setup, np.array([lower, upper]), np.inf)
     _label_detonators(axes, run, view)
+    _draw_gauges(axes, run, view)
     _label_box(axes, view, lower, upper)
     draw_scale(axes, view, window, length=False)
     axes.text(1.05, 0.5, _words(run), transform=axes.transAxes, fontsize=8.0, va="center", linespacing=1.6)
@@ -76,6 +78,18 @@ def _label_detonators(axes: Axes, run: Run, view: View) -> None:
             x, y = view.project(np.array(detonator.position)) / MILLIMETRE
             text = f"{number}: {detonator.time / MICROSECOND:.4g} µs"
             axes.annotate(text, (x, y), (6.0, 4.0), textcoords="offset points", fontsize=8.0)
+
+
+def _draw_gauges(axes: Axes, run: Run, view: View) -> None:
+    """A cross at each gauge, and the names of those that are there."""
+    names: dict[tuple[float, ...], list[str]] = {}
+    for gauge in setup_of(run).gauges:
+        names.setdefault(gauge.position, []).append(gauge.name)
+    for position, there in names.items():
+        x, y = view.project(np.array(position)) / MILLIMETRE
+        axes.plot(x, y, "x", markersize=4.0, color=GAUGE, markeredgewidth=1.0, zorder=5)
+        text, offset = ",\n".join(there), (5.0, -4.0)
+        axes.annotate(text, (x, y), offset, textcoords="offset points", va="top", fontsize=7.0, color=GAUGE)
 
 
 def _label_box(axes: Axes, view: View, lower: np.ndarray, upper: np.ndarray) -> None:
