@@ -144,8 +144,8 @@ class _Run:
             from warp_mpm.output.steps import write_steps
             from warp_mpm.output.tables import write_summary
 
-            write_steps(self.output / STEPS, record, self.pictures)
             write_summary(self.output / SUMMARY, summary)
+            write_steps(self.output / STEPS, record, self.pictures)
             if self.save.figures:
                 self.progress.message("drawing figures")
                 summary["warnings"] += self._draw()
