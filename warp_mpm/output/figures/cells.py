@@ -28,6 +28,7 @@ class Cells:
 
 def frame_cells(run: Run, frame: SavedFrame) -> Cells:
     """The cells of a frame that hold particles."""
+    frame = run.frames[frame.index]  # its own, which goes with all that it has read when the cells are there
     return _count(run, frame.position[frame.inside], frame.pressure[frame.inside])
 
 
