@@ -70,6 +70,9 @@ MISTAKES = [
     (("export", "nowhere"), "the following arguments are required: --to"),
     (("export", "nowhere", "--to", "x.pvd"), "export: expected a run directory or a USD file, got 'nowhere'"),
     (("export", ".", "--to", "x.obj"), "export: --to: expected a file that ends in .pvd or .glb, or a directory"),
+    (("figures", "nowhere"), "load: expected a run directory or a USD file, got 'nowhere'"),
+    (("figures", "."), "which has neither"),
+    (("figures", ".", "--animate", "avi"), "argument --animate: invalid choice: 'avi'"),
     (("run", "two_pont"), "expected a scene file, or one of"),
     (("run", "nowhere/two_point.py"), "got 'nowhere/two_point.py'"),
     ((*RUN, "cel_size=1"), "scene two_point: expected one of cell_size"),
@@ -173,7 +176,7 @@ def test_other_ends_are_one_line_too(capfd, monkeypatch, raised, exit_code, text
     assert errors.count("\n") == 1
 
 
-def test_run_then_info_and_export(capfd, tmp_path, monkeypatch):
+def test_run_then_info_figures_and_export(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "two_point", "--set", *COARSE, "--frames", "2", "--solver", "burn_width=2"]) == 0
     output, errors = capfd.readouterr()
@@ -188,6 +191,9 @@ def test_run_then_info_and_export(capfd, tmp_path, monkeypatch):
     assert main(["export", os.path.join("out", "two_point"), "--frame", "1", "--to", "two_point.glb"]) == 0
     assert capfd.readouterr().out == "two_point.glb\n"
     assert Path("two_point.glb").read_bytes()[:4] == b"glTF"
+    assert main(["figures", os.path.join("out", "two_point"), "energy", "gauges", "-o", "again"]) == 0
+    assert capfd.readouterr().out == "energy.png, gauges.png in again\n"
+    assert "got 'x'" in mistake(capfd, "figures", os.path.join("out", "two_point"), "x")
 
 
 def test_importing_the_package_is_light():

@@ -3,6 +3,7 @@
     import warp_mpm as mpm
     scene = mpm.load_scene("two_point", cell_size=6e-3)
     result = mpm.simulate(scene, output="out/two_point")
+    run = mpm.load("out/two_point")
 
 Names are imported when they are first used, so that `warp-mpm --help` does not wait for Warp.
 """
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from warp_mpm.geometry import Box, Cylinder, Sphere
     from warp_mpm.kernels.eos.ideal_gas import IdealGas
     from warp_mpm.materials import Material, OnMismatch, ammonium_nitrate, explosive
+    from warp_mpm.run_directory import Run, load
     from warp_mpm.scene import Scene, Wall, Walls
     from warp_mpm.scene_loading import list_scenes, load_scene
     from warp_mpm.simulation import Result, simulate
@@ -37,6 +39,7 @@ __all__ = [
     "PlaneDetonator",
     "PointDetonator",
     "Result",
+    "Run",
     "Save",
     "Scene",
     "SceneBuilder",
@@ -51,6 +54,7 @@ __all__ = [
     "ammonium_nitrate",
     "explosive",
     "list_scenes",
+    "load",
     "load_scene",
     "simulate",
 ]
@@ -63,6 +67,7 @@ _HOMES = {
     "geometry": ("Box", "Cylinder", "Sphere"),
     "kernels.eos.ideal_gas": ("IdealGas",),
     "materials": ("Material", "OnMismatch", "ammonium_nitrate", "explosive"),
+    "run_directory": ("Run", "load"),
     "scene": ("Scene", "Wall", "Walls"),
     "scene_loading": ("list_scenes", "load_scene"),
     "simulation": ("Result", "simulate"),

@@ -11,7 +11,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from warp_mpm.checks import count, mistake
 from warp_mpm.config import Save, SolverConfig
@@ -84,6 +84,22 @@ def _parser() -> argparse.ArgumentParser:
     scenes.set_defaults(command=_list)
     scenes.add_argument("directory", metavar="DIR", nargs="?", help="default: ./scenes and the shipped scenes")
 
+    _add_result_commands(commands, common)
+
+    text = "Solve problems with exact answers: error tables, pictures, and exit code 1 when a bound is broken."
+    check = commands.add_parser("verify", parents=[common], help="compare with exact solutions", description=text)
+    check.set_defaults(command=_verify)
+    check.add_argument("problems", metavar="PROBLEM", nargs="*", help="names that --list shows (default: all)")
+    check.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: out/verify)")
+    check.add_argument("--full", action="store_true", help="also the levels that take long (about 40 minutes)")
+    check.add_argument("--levels", metavar="N", type=int, help="the N coarsest levels of each problem instead")
+    check.add_argument("--list", action="store_true", help="list the problems and do nothing else")
+    _add_solving(check)
+    return parser
+
+
+def _add_result_commands(commands: Any, common: argparse.ArgumentParser) -> None:
+    """The commands that look at what a run left."""
     info = commands.add_parser("info", parents=[common], help="describe a result", description="Describe a result.")
     info.set_defaults(command=_info)
     info.add_argument("path", metavar="PATH", type=Path, help="a run directory or a USD file")
@@ -96,16 +112,13 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--to", metavar="FILE", type=Path, required=True, help=to)
     export.add_argument("--frame", metavar="K", type=int, help="one frame, from 0 (.pvd: default all; .glb: needed)")
 
-    text = "Solve problems with exact answers: error tables, pictures, and exit code 1 when a bound is broken."
-    check = commands.add_parser("verify", parents=[common], help="compare with exact solutions", description=text)
-    check.set_defaults(command=_verify)
-    check.add_argument("problems", metavar="PROBLEM", nargs="*", help="names that --list shows (default: all)")
-    check.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: out/verify)")
-    check.add_argument("--full", action="store_true", help="also the levels that take long (about 40 minutes)")
-    check.add_argument("--levels", metavar="N", type=int, help="the N coarsest levels of each problem instead")
-    check.add_argument("--list", action="store_true", help="list the problems and do nothing else")
-    _add_solving(check)
-    return parser
+    text = "Draw the pictures of a run again, from what it left in its directory."
+    figures = commands.add_parser("figures", parents=[common], help="draw the pictures of a run", description=text)
+    figures.set_defaults(command=_figures)
+    figures.add_argument("directory", metavar="DIR", type=Path, help="a run directory")
+    figures.add_argument("names", metavar="PICTURE", nargs="*", help="field, section, ... (default: all there are)")
+    figures.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: DIR/figures)")
+    figures.add_argument("--animate", choices=("gif", "mp4"), help="field and section at every frame, too")
 
 
 def _add_solving(parser: argparse.ArgumentParser) -> None:
@@ -224,6 +237,31 @@ def _export(options: argparse.Namespace) -> None:
     from warp_mpm.output.export import export
 
     print(export(options.path, options.to, options.frame))
+
+
+def _figures(options: argparse.Namespace) -> None:
+    """Draw the pictures of a run, and print which.
+
+    Raises:
+        InputError: no run directory, an unknown picture, or a program that drawing needs is missing.
+    """
+    from warp_mpm.run_directory import FIGURES, load
+
+    try:
+        from warp_mpm.output.figures import draw_figures, render
+    except ImportError as error:
+        raise mistake("figures", "matplotlib", "none", "pip install matplotlib") from error
+    run = load(options.directory)
+    wants_pyvista = render.is_installed() and "field" in (options.names or ["field"])
+    fault = render.fault() if wants_pyvista else None
+    if fault is not None:
+        print(f"PyVista cannot draw here ({fault}): matplotlib draws the surfaces, coarser")
+    smooth = wants_pyvista and fault is None
+    target = options.output if options.output is not None else options.directory / FIGURES
+    drawn, missing = draw_figures(run, target, options.names, options.animate, smooth)
+    for name, reason in missing.items():
+        print(f"{name}: not drawn, {reason}")
+    print(f"{', '.join(drawn) or 'nothing'} in {target}")
 
 
 def _verify(options: argparse.Namespace) -> None:

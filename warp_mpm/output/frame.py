@@ -1,5 +1,6 @@
 """What the run hands to the outputs: plain NumPy data, in creation order, no Warp."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -44,3 +45,27 @@ class LineRecord:
     time: np.ndarray  # (steps,) float64 [s]
     distance: np.ndarray  # (points,) float64 [m] from the line's start
     pressure: np.ndarray  # (steps, points) [Pa]
+
+
+@dataclass(frozen=True)
+class SectionRecord:
+    """What every step left on the section plane, at its nodes."""
+
+    peak: np.ndarray  # (nodes_u, nodes_v) [Pa]: highest field pressure of all steps
+    arrival: np.ndarray  # (nodes_u, nodes_v) [s]: when a front came; NaN where none has
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """What was recorded, one row a step, the initial state first. Pressures in Pa, times in s."""
+
+    time: np.ndarray  # (steps,) float64
+    dt: np.ndarray  # (steps,)
+    particle_pressure: np.ndarray  # (steps,) highest of all particles
+    field_pressure: np.ndarray  # (steps,) highest of all nodes at least half filled
+    path_pressure: np.ndarray | None  # (steps,) highest within a cell of the front path
+    point_pressures: np.ndarray  # (steps, points) highest within two cells of each collision point
+    path: LineRecord | None  # along the front path
+    line: LineRecord | None  # along the scene's line
+    section: SectionRecord
+    gauges: Mapping[str, GaugeRecord] = field(default_factory=dict)  # by name; in gauges.csv
