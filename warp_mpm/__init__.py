@@ -15,7 +15,7 @@ from warp_mpm import version
 
 if TYPE_CHECKING:
     from warp_mpm.builder import SceneBuilder
-    from warp_mpm.config import Order, Save, ShapeFunction, SolverConfig, Transfer
+    from warp_mpm.config import Layout, Order, Save, ShapeFunction, SolverConfig, Transfer
     from warp_mpm.detonators import PlaneDetonator, PointDetonator
     from warp_mpm.errors import InputError, SimulationError
     from warp_mpm.geometry import Box, Cylinder, Sphere
@@ -33,6 +33,7 @@ __all__ = [
     "Cylinder",
     "IdealGas",
     "InputError",
+    "Layout",
     "Material",
     "OnMismatch",
     "Order",
@@ -61,7 +62,7 @@ __all__ = [
 
 _HOMES = {
     "builder": ("SceneBuilder",),
-    "config": ("Order", "Save", "ShapeFunction", "SolverConfig", "Transfer"),
+    "config": ("Layout", "Order", "Save", "ShapeFunction", "SolverConfig", "Transfer"),
     "detonators": ("PlaneDetonator", "PointDetonator"),
     "errors": ("InputError", "SimulationError"),
     "geometry": ("Box", "Cylinder", "Sphere"),

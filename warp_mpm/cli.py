@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from warp_mpm.checks import count, mistake
-from warp_mpm.config import Save, SolverConfig
+from warp_mpm.config import PARTICLE_FIELDS, Layout, Save, SolverConfig
 from warp_mpm.errors import InputError, SimulationError, VerificationError
 from warp_mpm.parameters import annotations_of, from_text
 from warp_mpm.version import VERSION
@@ -77,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("scene", metavar="SCENE", help="a scene file, or a name that 'warp-mpm list' shows")
     run.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: out/<scene>)")
     _add_settings(run, "--set", "parameters of the scene, e.g. cell_size=6e-3 confinement=free")
-    run.add_argument("--frames", type=int, default=Save().frames, help="saved frames (default: %(default)s)")
+    _add_saving(run)
     _add_solving(run)
 
     scenes = commands.add_parser("list", parents=[common], help="list scenes", description="List scenes.")
@@ -119,6 +119,55 @@ def _add_result_commands(commands: Any, common: argparse.ArgumentParser) -> None
     figures.add_argument("names", metavar="PICTURE", nargs="*", help="field, section, ... (default: all there are)")
     figures.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: DIR/figures)")
     figures.add_argument("--animate", choices=("gif", "mp4"), help="field and section at every frame, too")
+
+
+def _add_saving(parser: argparse.ArgumentParser) -> None:
+    """The options that say what is saved."""
+    default = Save()
+    parser.add_argument("--frames", type=int, default=default.frames, help="saved frames (default: %(default)s)")
+    parser.add_argument(
+        "--fields",
+        metavar="FIELD",
+        nargs="+",
+        default=list(default.fields),
+        help=f"further particle fields in the USD file: {', '.join(PARTICLE_FIELDS)}",
+    )
+    parser.add_argument(
+        "--layout",
+        choices=[layout.value for layout in Layout],
+        default=default.layout.value,
+        help="the USD file: in one, as one clip a frame, or (auto) in one if it is below about 1 GB",
+    )
+    parser.add_argument(
+        "--particles-every",
+        metavar="K",
+        type=int,
+        default=default.particles_every,
+        help="one particle in K in the USD file; the section stays whole (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--isosurface",
+        metavar="PRESSURE_PA",
+        type=float,
+        help="also show in the USD file where the pressure has this value [Pa]",
+    )
+    parser.add_argument("--usdz", action="store_true", help="also pack the USD file into a .usdz")
+
+
+def _save(options: argparse.Namespace) -> Save:
+    """What a command saves.
+
+    Raises:
+        InputError: a value is out of range, or a field is unknown.
+    """
+    return Save(
+        frames=options.frames,
+        fields=tuple(options.fields),
+        layout=Layout(options.layout),
+        particles_every=options.particles_every,
+        isosurface=options.isosurface,
+        usdz=options.usdz,
+    )
 
 
 def _add_solving(parser: argparse.ArgumentParser) -> None:
@@ -179,7 +228,7 @@ def _run(options: argparse.Namespace) -> None:
     from warp_mpm.warp_startup import start_quietly
 
     config = _solver_config(options)
-    save = Save(frames=options.frames)
+    save = _save(options)
     start_quietly()
     scene = load_scene_from_text(options.scene, options.set)
     progress = progress_on(Console())

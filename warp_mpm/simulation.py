@@ -15,6 +15,7 @@ from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, totals_of
 from warp_mpm.errors import SimulationError
 from warp_mpm.guards import check_faults, check_memory, writable_directory
+from warp_mpm.isosurface import pressure_isosurface
 from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.model import Model, build_model
@@ -225,6 +226,10 @@ class _Run:
                     pressure_range=(0.0, color_limit(self.scene)),
                     frames=self.save.frames,
                     fields=self.save.fields,
+                    particles_every=self.save.particles_every,
+                    isosurface=self.save.isosurface,
+                    layout=self.save.layout,
+                    usdz=self.save.usdz,
                 )
             )
             write_gauges = self._gauge_writer(self.output / "gauges.csv", stack)
@@ -259,7 +264,10 @@ class _Run:
     def _frame(self, index: int, now: float, pressure: np.ndarray, inside: np.ndarray) -> Frame:
         sources = {"particleVelocity": "velocity"}
         values = {name: self.state.field(sources.get(name, name)) for name in self.save.fields}
-        return Frame(index, now, self.state.positions(), pressure, inside, section_pressure(self.state), values)
+        section = section_pressure(self.state)
+        level = self.save.isosurface
+        surface = None if level is None else pressure_isosurface(self.state, level)
+        return Frame(index, now, self.state.positions(), pressure, inside, section, values, surface)
 
     def _write_start(self) -> None:
         """Say what is run before it is run: a run that is killed leaves frames, and what they show."""

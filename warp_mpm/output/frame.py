@@ -7,6 +7,14 @@ import numpy as np
 
 
 @dataclass(frozen=True)
+class Surface:
+    """Triangles; each turns its front, where its corners run counterclockwise, to the lower pressure."""
+
+    points: np.ndarray  # (n, 3) float32 [m]
+    triangles: np.ndarray  # (m, 3) int32, indices of points
+
+
+@dataclass(frozen=True)
 class Frame:
     """The state at one saved instant."""
 
@@ -17,6 +25,7 @@ class Frame:
     inside: np.ndarray  # (n,) bool; False once the particle has left through an open face
     section: np.ndarray  # (nodes_u, nodes_v) [Pa]: field pressure at the nodes of the section plane
     fields: dict[str, np.ndarray] = field(default_factory=dict)  # further particle fields, (n,) or (n, 3)
+    isosurface: Surface | None = None  # where the field pressure is `Save.isosurface`
 
 
 @dataclass(frozen=True)
