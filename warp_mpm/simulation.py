@@ -236,12 +236,12 @@ class _Run:
             history: list[TableWriter] = []
 
             def write(index: int, now: float, pressure: np.ndarray, inside: np.ndarray, row: dict[str, float]) -> None:
+                usd.write(self._frame(index, now, pressure, inside))  # before its row: what has a row can be shown
                 if not history:
                     path = self.output / "history.csv" if self.output else Path()
                     history.append(stack.enter_context(TableWriter(path, list(row))))
                 history[0].write(row)
                 write_gauges()
-                usd.write(self._frame(index, now, pressure, inside))
 
             yield write
 

@@ -9,23 +9,23 @@ they are to stay apart, and packs the result into `<name>.usdz` if asked to.
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pxr import Gf, Sdf, Tf, UsdUtils, Vt
+from pxr import Gf, Sdf, Tf, Vt
 
 from warp_mpm.config import Layout
-from warp_mpm.errors import SimulationError
 from warp_mpm.output.frame import Frame
 from warp_mpm.output.usd_frame import FrameSampler
 from warp_mpm.output.usd_layout import WORLD, Contents, author_stage_metadata, author_static
+from warp_mpm.output.usd_package import pack
 from warp_mpm.output.whole_file import whole_file, write_error
 from warp_mpm.scene import Scene
 
 MERGE_LIMIT = 1_000_000_000  # [bytes] of frames that Layout.AUTO merges
 MERGE_BATCH = 50_000_000  # [bytes] of frames that are in memory at once while merging
-PACKAGE_LIMIT = 2**32  # [bytes]; offsets in a .usdz have 32 bits
 STATIC = "static.usdc"  # in clips/: every prim, and every value that does not change
 MANIFEST = "manifest.usda"  # in clips/: which attributes the clips animate
 
@@ -116,22 +116,25 @@ class UsdWriter:
         if not self._clips.exists():
             return self._path
         try:
-            size = sum(self._clip(index).stat().st_size for index in self._indices)
-            result = self._path if self._is_merged(size) else self._root
-            if result == self._path:
+            if self._is_merged():
                 with whole_file(self._path) as part, _errors_of_usd():
                     self._merge_into(part)
                 self._remove_working_files()
+                files = [self._path]
+            else:
+                clips = [self._clip(index) for index in self._indices]
+                files = [self._root, self._clips / STATIC, self._clips / MANIFEST, *clips]
         except OSError as error:
             raise write_error(self._clips, error) from error
         if self._usdz:
-            self._pack(result, size)
-        return result
+            pack(self._package, files)
+        return files[0]
 
-    def _is_merged(self, size: int) -> bool:
-        """Whether frames of so many bytes become one file; without any there are no clips to play."""
+    def _is_merged(self) -> bool:
+        """Whether the frames become one file; without any there are no clips to play."""
         if not self._indices or self._layout is Layout.SINGLE:
             return True
+        size = sum(self._clip(index).stat().st_size for index in self._indices)
         return self._layout is Layout.AUTO and size <= MERGE_LIMIT
 
     def _root_layer(self) -> Any:
@@ -171,7 +174,7 @@ class UsdWriter:
         open_clips: list[Any] = []
         size = 0
         for index in self._indices:
-            clip = Sdf.Layer.FindOrOpen(str(self._clip(index)))
+            clip = Sdf.Layer.OpenAsAnonymous(str(self._clip(index)))  # afresh, whoever still shows an earlier run
             for path in self._sampler.types:
                 merged.SetTimeSample(path, float(index), clip.QueryTimeSample(path, float(index)))
             open_clips.append(clip)
@@ -182,17 +185,6 @@ class UsdWriter:
                 size = 0
         merged.Save()
 
-    def _pack(self, result: Path, size: int) -> None:
-        """Pack the result, with its clips if it has any, into one .usdz."""
-        if size >= PACKAGE_LIMIT:
-            raise SimulationError(
-                f"cannot write {self._package}: expected less than the {PACKAGE_LIMIT / 1e9:.1f} GB that a .usdz can "
-                f"hold, got {size / 1e9:.1f} GB; show fewer particles, or play {result.name} instead"
-            )
-        with whole_file(self._package) as part, _errors_of_usd():
-            if not UsdUtils.CreateNewUsdzPackage(str(result), str(part)):
-                raise OSError("USD gives no reason")
-
     def _author_metadata(self, layer: Any) -> None:
         frames = self._indices[-1] + 1 if self._indices else 0
         author_stage_metadata(layer, self._contents, self._microseconds_per_time_code, frames)
@@ -201,13 +193,17 @@ class UsdWriter:
         return self._clips / f"frame_{index:05d}.usdc"
 
     def _remove_working_files(self) -> None:
-        """Remove the root layer first: without it the clips are just files, without them it would be a broken stage."""
+        """Remove the root layer first: without it the clips are just files, without them it would be a broken stage.
+
+        A killed run leaves unfinished files too, `<name>.part.` and then a suffix or some letters that USD makes up.
+        """
         self._root.unlink(missing_ok=True)
-        if self._clips.is_dir():
-            for file in [*self._clips.glob("frame_*.usdc"), self._clips / STATIC, self._clips / MANIFEST]:
-                file.unlink(missing_ok=True)
-            if not any(self._clips.iterdir()):
-                self._clips.rmdir()
+        files = [*self._path.parent.glob(f"{escape(self._path.stem)}.part.*")]
+        files += [file for pattern in ("frame_*", "static.*", "manifest.*") for file in self._clips.glob(pattern)]
+        for file in files:
+            file.unlink(missing_ok=True)
+        if self._clips.is_dir() and not any(self._clips.iterdir()):
+            self._clips.rmdir()
 
 
 def _manifest(types: Mapping[str, Any]) -> Any:
