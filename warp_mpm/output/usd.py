@@ -72,8 +72,8 @@ class UsdWriter:
         self._contents = Contents(scene, pressure_range, tuple(fields), particles_every, isosurface)
         self._sampler = FrameSampler(self._contents)
         self._indices: list[int] = []
-        self._static = Sdf.Layer.CreateAnonymous(".usdc")
-        author_static(self._static, self._contents)
+        self._result: Path | None = None
+        self._static = _static(self._contents)
         try:
             self._remove_working_files()
             for old in (self._path, self._package):
@@ -113,22 +113,14 @@ class UsdWriter:
         Raises:
             SimulationError: the disk is full or refuses. The frames stay readable through `<name>.usda`.
         """
-        if not self._clips.exists():
-            return self._path
-        try:
-            if self._is_merged():
-                with whole_file(self._path) as part, _errors_of_usd():
-                    self._merge_into(part)
-                self._remove_working_files()
-                files = [self._path]
-            else:
-                clips = [self._clip(index) for index in self._indices]
-                files = [self._root, self._clips / STATIC, self._clips / MANIFEST, *clips]
-        except OSError as error:
-            raise write_error(self._clips, error) from error
-        if self._usdz:
-            pack(self._package, files)
-        return files[0]
+        if self._result is None:
+            try:
+                self._result = self._merge() if self._is_merged() else self._root
+            except OSError as error:
+                raise write_error(self._clips, error) from error
+            if self._usdz:
+                pack(self._package, self._files(self._result))
+        return self._result
 
     def _is_merged(self) -> bool:
         """Whether the frames become one file; without any there are no clips to play."""
@@ -162,28 +154,43 @@ class UsdWriter:
         )
         return layer
 
-    def _merge_into(self, part: Path) -> None:
+    def _merge(self) -> Path:
+        with whole_file(self._path) as part, _errors_of_usd():
+            self._write_merged(part)
+        self._remove_working_files()
+        return self._path
+
+    def _write_merged(self, part: Path) -> None:
         """Write everything into one file, some frames at a time.
 
         Samples are views of the mapped clip files. Once the layer is saved it has views of its own file instead, which
         is mapped but not read, and the clips can be let go.
         """
         merged = Sdf.Layer.CreateNew(str(part))
-        merged.TransferContent(self._static)
-        self._author_metadata(merged)
-        open_clips: list[Any] = []
-        size = 0
-        for index in self._indices:
-            clip = Sdf.Layer.OpenAsAnonymous(str(self._clip(index)))  # afresh, whoever still shows an earlier run
-            for path in self._sampler.types:
-                merged.SetTimeSample(path, float(index), clip.QueryTimeSample(path, float(index)))
-            open_clips.append(clip)
-            size += self._clip(index).stat().st_size
-            if size >= MERGE_BATCH:
-                merged.Save()
-                open_clips.clear()
-                size = 0
-        merged.Save()
+        try:
+            merged.TransferContent(self._static)
+            self._author_metadata(merged)
+            open_clips: list[Any] = []
+            size = 0
+            for index in self._indices:
+                clip = Sdf.Layer.OpenAsAnonymous(str(self._clip(index)))  # afresh, whoever still shows an earlier run
+                for path in self._sampler.types:
+                    merged.SetTimeSample(path, float(index), clip.QueryTimeSample(path, float(index)))
+                open_clips.append(clip)
+                size += self._clip(index).stat().st_size
+                if size >= MERGE_BATCH:
+                    merged.Save()
+                    open_clips.clear()
+                    size = 0
+            merged.Save()
+        finally:
+            del merged  # an error keeps the variables of this function, and USD allows one layer of a name
+
+    def _files(self, result: Path) -> list[Path]:
+        """The result and all that it needs."""
+        if result == self._path:
+            return [result]
+        return [result, self._clips / STATIC, self._clips / MANIFEST, *map(self._clip, self._indices)]
 
     def _author_metadata(self, layer: Any) -> None:
         frames = self._indices[-1] + 1 if self._indices else 0
@@ -206,6 +213,13 @@ class UsdWriter:
             self._clips.rmdir()
 
 
+def _static(contents: Contents) -> Any:
+    """Every prim, and every value that does not change."""
+    layer = Sdf.Layer.CreateAnonymous(".usdc")
+    author_static(layer, contents)
+    return layer
+
+
 def _manifest(types: Mapping[str, Any]) -> Any:
     """Declare the animated attributes and nothing else: whatever is in a manifest counts as animated."""
     layer = Sdf.Layer.CreateAnonymous(".usda")
@@ -216,6 +230,8 @@ def _manifest(types: Mapping[str, Any]) -> Any:
 
 def _export(layer: Any, path: Path) -> None:
     with whole_file(path) as part, _errors_of_usd():
+        if not path.parent.is_dir():  # USD would make it anew, without the frames before
+            raise NotADirectoryError("the directory is gone")
         layer.Export(str(part))
 
 
