@@ -99,7 +99,7 @@ MISTAKES = [
     (("run", "two_point", "--frames", "many"), "argument --frames: invalid int value: 'many'"),
     (("run", "two_point", "--layout", "split"), "argument --layout: invalid choice: 'split'"),
     (("run", "two_point", "--particles-every", "0"), "save: particles_every: expected a whole number of at least 1"),
-    (("run", "two_point", "--isosurface", "-1e9"), "save: isosurface: expected a positive number, got -1000000000.0"),
+    (("run", "two_point", "--isosurface", "0"), "save: isosurface: expected a positive number, got 0.0"),
     (("run", "two_point", "--isosurface", "nan"), "save: isosurface: expected a positive number, got nan"),
     (("run", "two_point", "--fields", "density", "hue"), "save: fields: expected any of density, burn_fraction"),
     (("run", "two_point", "--threads", "0"), "threads: expected a whole number of at least 1, got 0"),
