@@ -49,10 +49,15 @@ def test_a_run_has_the_times_of_its_history(tmp_path, layout):
     assert_sound(path, [row["time_s"] for row in result.history])
 
 
-def test_the_asset_validator_finds_nothing():
-    """Elsewhere it is passed over where it is missing; here that is said."""
+def test_the_asset_validator_can_fail(scene, tmp_path):
+    """Other tests pass it over where it is missing; this one says so."""
     if not usd_checks.has_asset_validator():
-        pytest.skip("omniverse-asset-validator is not installed; it is for Python up to 3.12")
+        pytest.skip("omniverse-asset-validator is not installed; there is none for Python 3.13")
+    path = closed(tmp_path, scene)
+    stage = Usd.Stage.Open(str(path))
+    stage.GetPrimAtPath("/World/section").RemoveProperty("normals")
+    stage.Save()
+    assert any("NormalsExist" in issue for issue in usd_checks.asset_validator_issues(path))
 
 
 def without_a_point(stage):
