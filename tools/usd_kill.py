@@ -25,7 +25,7 @@ from pxr import Usd, UsdGeom
 
 FRAMES = 60
 RUN = ("two_point", "--set", "cell_size=8e-3", "--layout", "single", "--isosurface", "1e9", "--frames", str(FRAMES))
-LATEST = 0.03  # [s] after the moment; frames come every few hundredths, and merging takes some
+LATEST_FRAME, LATEST_MERGE = 0.03, 0.3  # [s] after the moment: about what a frame takes, and all of merging
 PATIENCE = 120.0  # [s] for a moment to come
 
 
@@ -43,7 +43,8 @@ def main() -> int:
             rows = 1 + number * FRAMES // kills
             in_merge = number % 5 == 4
             come = merging(whole) if in_merge else has_rows(whole.with_name("history.csv"), rows)
-            kill_when(come, chance.random() * LATEST, Path(directory))
+            delay = chance.random() * (LATEST_MERGE if in_merge else LATEST_FRAME)
+            kill_when(come, delay, Path(directory))
             problem = fault(whole)
             good += not problem
             left["the whole file" if whole.exists() else "clips"] += 1
