@@ -11,7 +11,7 @@ from usd_checks import assert_sound, faults
 from usd_frames import FRAMES, RANGE, TIMES, frame_of, open_scene, section_of, surface_of, written
 
 from warp_mpm.config import PARTICLE_FIELDS, Layout, Save
-from warp_mpm.errors import SimulationError
+from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.output import colormap, usd, usd_package
 from warp_mpm.simulation import simulate
 
@@ -118,6 +118,19 @@ def test_our_checks_can_fail(scene, tmp_path, spoil, found):
     assert list(faults(stage, TIMES)) == []
     spoil(stage)
     assert any(found in fault for fault in faults(stage, TIMES))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"layout": "clips"}, "save: layout: expected a Layout, such as Layout.CLIPS, got 'clips'"),
+        ({"particles_every": 1.5}, "save: particles_every: expected a whole number of at least 1, got 1.5"),
+        ({"isosurface": -1e9}, "save: isosurface: expected a positive number, got -1000000000.0"),
+    ],
+)
+def test_what_cannot_be_saved_is_one_line(options, message):
+    with pytest.raises(InputError, match=message):
+        Save(**options)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 from pxr import Usd
 from scenes_for_tests import block
 
@@ -79,6 +80,7 @@ def points_found(path: Path) -> list[np.ndarray]:
     return [np.array(points.Get(index)) for index in range(round(stage.GetEndTimeCode()) + 1)]
 
 
+@pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="this system has no fork")
 def test_a_killed_run_keeps_every_finished_frame(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))  # for the server that starts the processes
     path = tmp_path / "block.usdc"
