@@ -25,7 +25,7 @@ from pxr import Usd, UsdGeom
 
 FRAMES = 60
 RUN = ("two_point", "--set", "cell_size=8e-3", "--layout", "single", "--isosurface", "1e9", "--frames", str(FRAMES))
-LATEST_FRAME, LATEST_MERGE = 0.03, 1.0  # [s] after the moment: about a frame, and to beyond all of merging
+LATEST_FRAME, LATEST_MERGE = 0.03, 0.1  # [s] after the moment: about what a frame takes, and what merging takes
 PATIENCE = 120.0  # [s] for a moment to come
 
 
@@ -56,7 +56,7 @@ def main() -> int:
 
 def kill_when(come: Callable[[], bool], delay: float, directory: Path) -> None:
     """Start a run and kill it some time after a moment has come."""
-    for old in ("history.csv", "two_point.usdc"):
+    for old in ("history.csv", "two_point.usdc", "two_point.part.usdc"):
         (directory / old).unlink(missing_ok=True)
     command = [sys.executable, "-m", "warp_mpm", "run", *RUN, "-o", str(directory)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
@@ -74,7 +74,8 @@ def has_rows(history: Path, rows: int) -> Callable[[], bool]:
 
 def merging(whole: Path) -> Callable[[], bool]:
     """Whether the merged file is under way."""
-    return lambda: any(whole.parent.glob(f"{whole.stem}.part.*")) or whole.exists()
+    part = whole.with_name(f"{whole.stem}.part.usdc")
+    return lambda: part.exists() or whole.exists()
 
 
 def finished_times(history: Path) -> list[float]:
