@@ -25,7 +25,7 @@ from pxr import Usd, UsdGeom
 
 FRAMES = 60
 RUN = ("two_point", "--set", "cell_size=8e-3", "--layout", "single", "--isosurface", "1e9", "--frames", str(FRAMES))
-LATEST_FRAME, LATEST_MERGE = 0.03, 0.1  # [s] after the moment: about what a frame takes, and what merging takes
+LATEST_FRAME, LATEST_MERGE = 0.03, 0.3  # [s] after the moment: about what a frame takes, and more than merging takes
 PATIENCE = 120.0  # [s] for a moment to come
 
 
