@@ -21,13 +21,11 @@ def state(device):
 
 
 def put(state: State, pressure_at) -> None:
-    """Give every node the pressure that a function has for its distance from the centre (n, 3) [m]."""
+    """Give every node the pressure that a function has for its distance from the centre (..., 3) [m]."""
     domain = state.model.scene.domain
-    shape = tuple(n + 3 for n in domain.cells)
-    place = (np.moveaxis(np.indices(shape), 0, -1) - 1) * domain.spacing + domain.lower
-    values = np.zeros(state.grid.pressure.size, dtype=np.float32)
-    values[: np.prod(shape)] = pressure_at(place - CENTRE).ravel()
-    state.grid.pressure.assign(values)
+    nodes = np.moveaxis(np.indices([n + 1 for n in domain.cells]), 0, -1)
+    values = pressure_at(nodes * domain.spacing + domain.lower - CENTRE)
+    state.field_pressure = lambda: values
 
 
 def cone(offset):
