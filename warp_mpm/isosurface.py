@@ -23,8 +23,8 @@ def pressure_isosurface(state: State, pressure: float) -> Surface:
     points, corners = IsoSurfaceMarchingCubes.extract(
         values,
         pressure,
-        lower=wp.vec3(*(domain.lower + begin * domain.spacing)),
-        upper=wp.vec3(*(domain.lower + (end - 1) * domain.spacing)),
+        lower=tuple(domain.lower + begin * domain.spacing),
+        upper=tuple(domain.lower + (end - 1) * domain.spacing),
     )
     return _clean(points.numpy(), corners.numpy())
 
