@@ -1,6 +1,11 @@
 """The material update: density, motion, burn fraction and pressure, from what a step did to a particle (`strain.py`).
 
-Composed from shape x order of the step x equation of state x burn law.
+Composed from shape x order of the step x equation of state x burn law x unreacted state. What has burnt has the
+pressure of the products, p(rho, e), the rest that of the unreacted state, p(rho, e - E0), or none without such a state:
+
+    p = F p_products(rho, e) + (1 - F) max(p_unreacted(rho, e - E0), 0).
+
+E0 is the energy before the burn, which is chemical. Unburnt explosive carries no tension.
 """
 
 import functools
@@ -42,14 +47,14 @@ class Response:
     closing_rate: scalar  # d of the viscosity [1/s], where there is any
     viscous_pressure: scalar  # its isotropic part [Pa]
     viscous_thrust: vector3  # its directed part is the pressure tensor s s^T [Pa]
-    sound_speed: scalar  # of the products, burnt or not [m/s]
+    sound_speed: scalar  # of the products, burnt or not; of the mixture where there is an unreacted state [m/s]
 
 
 @functools.cache
-def response_function(eos: Any, burn: Any) -> wp.Function:
+def response_function(eos: Any, burn: Any, unreacted: Any = None) -> wp.Function:
     """Device function: burn fraction, pressure, viscous pressure and sound speed from density and energy.
 
-    `eos` is a class of `eos/`, `burn` a class of `burn/` or None.
+    `eos` is a class of `eos/`, `burn` a class of `burn/` or None, `unreacted` a class of `eos/` or None.
     """
     pressure_offset, pressure_slope = eos.pressure_offset, eos.pressure_slope
     sound_speed_squared = eos.sound_speed_squared
@@ -57,11 +62,18 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
     burn_fraction = burn.burn_fraction if burns else None
+    resists = unreacted is not None  # before it burns
+    unreacted_record = unreacted.Record if resists else wp.int32
+    unreacted_offset = unreacted.pressure_offset if resists else None
+    unreacted_slope = unreacted.pressure_slope if resists else None
+    unreacted_sound_squared = unreacted.sound_speed_squared if resists else None
 
     @wp.func
     def respond(
         eos_parameters: eos_record,
         burn_parameters: burn_record,
+        unreacted_parameters: unreacted_record,
+        chemical_energy: scalar,
         viscosity: Viscosity,
         density: scalar,
         energy: scalar,
@@ -79,14 +91,24 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
         products = pressure_offset(eos_parameters, density) + pressure_slope(eos_parameters, density) * energy
         result.burn_fraction = burnt
         result.pressure = burnt * products
-        result.sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
-        if wp.min(closing, divergence) < ZERO and burnt > ZERO:  # nothing closes in most of an expanding gas
+        squared = sound_speed_squared(eos_parameters, density, energy)
+        onset = wp.min(burnt * PER_IGNITED, ONE)
+        if wp.static(resists):
+            thermal = energy - chemical_energy
+            solid = unreacted_offset(unreacted_parameters, density)
+            solid += unreacted_slope(unreacted_parameters, density) * thermal
+            result.pressure += (ONE - burnt) * wp.max(solid, ZERO)
+            solid_squared = unreacted_sound_squared(unreacted_parameters, density, thermal)
+            squared = burnt * squared + (ONE - burnt) * solid_squared
+            onset = ONE
+        result.sound_speed = wp.sqrt(wp.max(squared, ZERO))
+        if wp.min(closing, divergence) < ZERO and onset > ZERO:  # nothing closes in most of an expanding gas
             axis = directedness(viscosity, result.sound_speed, divergence) * direction
             share = wp.dot(axis, axis)
             result.closing_rate = closing_rate(share, closing, divergence)
             length = viscous_length(viscosity, axis)
             q = viscous_pressure(viscosity, length, density, result.sound_speed, result.closing_rate)
-            q *= wp.min(burnt * PER_IGNITED, ONE)
+            q *= onset
             result.viscous_pressure = q * (ONE - share)
             result.viscous_thrust = wp.sqrt(q) * axis
         return result
@@ -118,18 +140,21 @@ def raise_burn_speed(maxima: wp.array(dtype=Maxima), slab: int, burnt: scalar, s
 
 
 @functools.cache
-def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
+def initial_kernel(eos: Any, burn: Any, unreacted: Any = None) -> wp.Kernel:
     """Burn fraction, pressure and rates at the start, from the initial density and energy."""
-    respond = response_function(eos, burn)
+    respond = response_function(eos, burn, unreacted)
     eos_record = eos.Record
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
+    unreacted_record = wp.int32 if unreacted is None else unreacted.Record
 
     @wp.kernel(enable_backward=False, module="unique")
     def initialise(
         particles: Particles,
         eos_parameters: eos_record,
         burn_parameters: burn_record,
+        unreacted_parameters: unreacted_record,
+        chemical_energy: scalar,
         viscosity: Viscosity,
         maxima: wp.array(dtype=Maxima),
         slab: int,
@@ -146,6 +171,8 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
         response = respond(
             eos_parameters,
             burn_parameters,
+            unreacted_parameters,
+            chemical_energy,
             viscosity,
             density,
             energy,
@@ -168,16 +195,24 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
 
 @functools.cache
 def update_kernel(
-    shape: Shape, strain: Strain, damped: bool, move: bool, eos: Any, burn: Any, thin: bool = False
+    shape: Shape,
+    strain: Strain,
+    damped: bool,
+    move: bool,
+    eos: Any,
+    burn: Any,
+    unreacted: Any = None,
+    thin: bool = False,
 ) -> wp.Kernel:
     """Strain, energy, density, damping, motion (`move`), then burn fraction and pressure for the next forces."""
     deform = deformation_function(shape, strain, damped)
     look_ahead = look_ahead_function(shape, False, strain is Strain.REPROJECTED)
-    respond = response_function(eos, burn)
+    respond = response_function(eos, burn, unreacted)
     sound_speed_squared = eos.sound_speed_squared
     eos_record = eos.Record
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
+    unreacted_record = wp.int32 if unreacted is None else unreacted.Record
 
     @wp.kernel(enable_backward=False, module="unique")
     def update(
@@ -187,6 +222,8 @@ def update_kernel(
         clock: wp.array(dtype=Clock),
         eos_parameters: eos_record,
         burn_parameters: burn_record,
+        unreacted_parameters: unreacted_record,
+        chemical_energy: scalar,
         viscosity: Viscosity,
         half_width: scalar,
         ambient_pressure: scalar,
@@ -252,6 +289,8 @@ def update_kernel(
         response = respond(
             eos_parameters,
             burn_parameters,
+            unreacted_parameters,
+            chemical_energy,
             viscosity,
             density,
             energy,

@@ -20,6 +20,7 @@ from warp_mpm.kernels.eos import EquationOfState
 HIGHEST_COMPRESSION = 20.0  # rho / rho0 up to which the state is searched
 SEARCH_STEP = 1.01  # growth of rho in the search
 BISECTIONS = 40
+LARGEST_POWER = 8.0  # of D^2 that the energy may follow, where pressure at zero energy matters much
 
 
 @dataclass(frozen=True)
@@ -86,18 +87,25 @@ def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: 
 def energy_for_speed(eos: EquationOfState, initial_density: float, detonation_speed: float) -> float:
     """Specific energy E0 [J/kg] with which the equation of state detonates at a given speed [m/s].
 
-    D^2 is proportional to E0 for an ideal gas and nearly so for others, which makes the iteration a quick one.
+    D^2 is proportional to E0 for an ideal gas. For others it follows some power of E0, which the iteration finds:
+    secants of the logarithms.
 
     Raises:
         ValueError: there is no such energy.
     """
-    energy = 0.25 * detonation_speed**2
+    energy, power = 0.25 * detonation_speed**2, 1.0
+    before: tuple[float, float] | None = None  # logarithms of the factor in energy and of what it did to D^2 / D'^2
     for _ in range(50):
         implied = chapman_jouguet_state(eos, initial_density, energy).detonation_speed
         ratio = (detonation_speed / implied) ** 2
-        energy *= ratio
         if abs(ratio - 1.0) < 5e-7:
-            return energy
+            return energy * ratio
+        lacking = math.log(ratio)
+        if before is not None and before[1] != lacking:
+            power = min(max(before[0] / (before[1] - lacking), 1.0), LARGEST_POWER)
+        factor = ratio**power
+        before = math.log(factor), lacking
+        energy *= factor
     raise ValueError(f"{eos}: expected an energy that gives {detonation_speed:g} m/s, found none")
 
 
