@@ -6,7 +6,12 @@ from enum import Enum
 from typing import Literal
 
 from warp_mpm.errors import InputError
-from warp_mpm.exact.chapman_jouguet import ChapmanJouguetState, chapman_jouguet_state, energy_for_speed
+from warp_mpm.exact.chapman_jouguet import (
+    ChapmanJouguetState,
+    chapman_jouguet_state,
+    energy_at_pressure,
+    energy_for_speed,
+)
 from warp_mpm.kernels.burn import BurnLaw
 from warp_mpm.kernels.burn.compression import CompressionBurn
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
@@ -16,6 +21,7 @@ from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.warp_startup import start_quietly
 
 ROUND_OFF = 1e-5  # relative difference of two speeds that are the same: single precision, and the digits people write
+ATMOSPHERE = 101325.0  # standard pressure [Pa]
 TOLERANCE = 0.01  # relative difference that is adjusted; more is an error
 
 
@@ -59,6 +65,9 @@ class Material:
     cj: ChapmanJouguetState | None = None  # what the equation of state implies
     warnings: tuple[str, ...] = ()  # what the check of the explosive has to say
     unreacted: EquationOfState | None = None  # of what has not burnt, with energies from E0; None: it has no pressure
+    stated_speed: float | None = None  # detonation speed stated for it [m/s]
+    stated_pressure: float | None = None  # Chapman-Jouguet pressure stated for it [Pa]
+    citation: str = ""  # where the numbers are from
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -77,6 +86,7 @@ def explosive(
     on_mismatch: OnMismatch = OnMismatch.ADJUST,
     burn: Burn = Burn.PROGRAMMED,
     unreacted: EquationOfState | None = None,
+    citation: str = "",
 ) -> Material:
     """An explosive, checked: does its equation of state detonate at the stated speed?
 
@@ -103,8 +113,37 @@ def explosive(
     if cj_pressure is not None:
         _check_positive(name, "cj_pressure", cj_pressure, "Pa")
         warnings += _matched_pressure(name, cj_pressure, state, on_mismatch)
-    law = _burn_law(burn, speed, density, state)
-    return Material(name, density, equation_of_state, specific_energy, law, state, warnings, unreacted)
+    return Material(
+        name,
+        density,
+        equation_of_state,
+        specific_energy,
+        burn=_burn_law(burn, speed, density, state),
+        cj=state,
+        warnings=warnings,
+        unreacted=unreacted,
+        stated_speed=detonation_speed,
+        stated_pressure=cj_pressure,
+        citation=citation,
+    )
+
+
+def inert(
+    name: str, *, density: float, equation_of_state: EquationOfState, pressure: float = ATMOSPHERE, citation: str = ""
+) -> Material:
+    """Matter that does not burn, at rest at a density [kg/m3] and a pressure [Pa].
+
+    Its energy follows from them, e = (p - a) / b.
+
+    Raises:
+        InputError: density or pressure is not positive and finite, or the energy that gives this pressure is not.
+    """
+    _check_positive(name, "density", density, "kg/m3")
+    _check_positive(name, "pressure", pressure, "Pa")
+    start_quietly()
+    return Material(
+        name, density, equation_of_state, energy_at_pressure(equation_of_state, density, pressure), citation=citation
+    )
 
 
 def ammonium_nitrate(*, energy: float | Literal["cj"] = "cj", on_mismatch: OnMismatch = OnMismatch.ADJUST) -> Material:
@@ -123,6 +162,7 @@ def ammonium_nitrate(*, energy: float | Literal["cj"] = "cj", on_mismatch: OnMis
         equation_of_state=IdealGas(gamma=2.0),
         energy=energy,
         on_mismatch=on_mismatch,
+        citation="Wang, Li, Wang, Yan, Sun, Applied Mathematics and Mechanics 36(2), 2015; energy by the CJ condition",
     )
 
 

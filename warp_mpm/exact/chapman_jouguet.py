@@ -34,16 +34,31 @@ class ChapmanJouguetState:
     sound_speed: float  # c [m/s] = D - u
 
 
-def hugoniot_pressure(eos: EquationOfState, initial_density: float, energy: float, density: float) -> float:
-    """Pressure p_H [Pa] of products at `density` behind a wave into matter of specific energy `energy` [J/kg].
+def pressure_of(eos: EquationOfState, density: float, energy: float) -> float:
+    """Pressure p = a + b e [Pa] at a density [kg/m3] and a specific energy [J/kg]."""
+    record = eos.record()
+    return float(eos.pressure_offset(record, density)) + float(eos.pressure_slope(record, density)) * energy
 
-    Infinite beyond the strongest compression that the Hugoniot allows.
+
+def energy_at_pressure(eos: EquationOfState, density: float, pressure: float) -> float:
+    """Specific energy e = (p - a) / b [J/kg] at a density [kg/m3] and a pressure [Pa]."""
+    record = eos.record()
+    return (pressure - float(eos.pressure_offset(record, density))) / float(eos.pressure_slope(record, density))
+
+
+def hugoniot_pressure(
+    eos: EquationOfState, initial_density: float, energy: float, density: float, initial_pressure: float = 0.0
+) -> float:
+    """Pressure p_H [Pa] of matter at `density` behind a wave into matter of specific energy `energy` [J/kg].
+
+    Infinite beyond the strongest compression that the Hugoniot e - E0 = (p + p0) (v0 - v) / 2 allows.
     """
     record = eos.record()
     offset = float(eos.pressure_offset(record, density))
     slope = float(eos.pressure_slope(record, density))
-    room = 1.0 - 0.5 * slope * (1.0 / initial_density - 1.0 / density)
-    return (offset + slope * energy) / room if room > 0.0 else math.inf
+    half = 0.5 * (1.0 / initial_density - 1.0 / density)
+    room = 1.0 - slope * half
+    return (offset + slope * (energy + initial_pressure * half)) / room if room > 0.0 else math.inf
 
 
 def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: float) -> ChapmanJouguetState:
