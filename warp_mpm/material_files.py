@@ -28,7 +28,7 @@ from pkgutil import iter_modules
 from typing import Any, Literal
 
 import warp_mpm.kernels.eos
-from warp_mpm.checks import mistake
+from warp_mpm.checks import mistake, positive
 from warp_mpm.errors import InputError
 from warp_mpm.kernels.eos import EquationOfState
 from warp_mpm.materials import ATMOSPHERE, Burn, Material, OnMismatch, explosive, inert
@@ -94,7 +94,8 @@ def _material(file: str, name: str, table: Any) -> Material:
         if key not in known:
             raise mistake(where, f"one of {', '.join(known)}", repr(key), closest_match(key, known))
     values = _filled(kind, plain, where)
-    laws = {key: _law(f"{where}: {key}", table[key], values.density) for key in LAWS if key in table}
+    density = positive(f"{where}: density", values.density)
+    laws = {key: _law(f"{where}: {key}", table[key], density) for key in LAWS if key in table}
     if LAWS[0] not in laws:
         raise mistake(f"{where}: {LAWS[0]}", "a table with a law and its parameters", "none")
     try:

@@ -20,6 +20,7 @@ from warp_mpm.kernels.eos import EquationOfState
 HIGHEST_COMPRESSION = 20.0  # rho / rho0 up to which the state is searched
 SEARCH_STEP = 1.01  # growth of rho in the search
 BISECTIONS = 40
+ITERATIONS = 20  # at most, for the energy; 3 to 8 are taken
 LARGEST_POWER = 8.0  # of D^2 that the energy may follow, where pressure at zero energy matters much
 
 
@@ -34,16 +35,22 @@ class ChapmanJouguetState:
     sound_speed: float  # c [m/s] = D - u
 
 
+def _linear(eos: EquationOfState, density: float) -> tuple[float, float]:
+    """The a [Pa] and b [kg/m3] of p = a + b e at a density [kg/m3]."""
+    record, at = eos.record(), float(density)  # device functions take no whole numbers
+    return float(eos.pressure_offset(record, at)), float(eos.pressure_slope(record, at))
+
+
 def pressure_of(eos: EquationOfState, density: float, energy: float) -> float:
     """Pressure p = a + b e [Pa] at a density [kg/m3] and a specific energy [J/kg]."""
-    record = eos.record()
-    return float(eos.pressure_offset(record, density)) + float(eos.pressure_slope(record, density)) * energy
+    offset, slope = _linear(eos, density)
+    return offset + slope * energy
 
 
 def energy_at_pressure(eos: EquationOfState, density: float, pressure: float) -> float:
     """Specific energy e = (p - a) / b [J/kg] at a density [kg/m3] and a pressure [Pa]."""
-    record = eos.record()
-    return (pressure - float(eos.pressure_offset(record, density))) / float(eos.pressure_slope(record, density))
+    offset, slope = _linear(eos, density)
+    return (pressure - offset) / slope
 
 
 def hugoniot_pressure(
@@ -53,9 +60,7 @@ def hugoniot_pressure(
 
     Infinite beyond the strongest compression that the Hugoniot e - E0 = (p + p0) (v0 - v) / 2 allows.
     """
-    record = eos.record()
-    offset = float(eos.pressure_offset(record, density))
-    slope = float(eos.pressure_slope(record, density))
+    offset, slope = _linear(eos, density)
     half = 0.5 * (1.0 / initial_density - 1.0 / density)
     room = 1.0 - slope * half
     return (offset + slope * (energy + initial_pressure * half)) / room if room > 0.0 else math.inf
@@ -110,7 +115,7 @@ def energy_for_speed(eos: EquationOfState, initial_density: float, detonation_sp
     """
     energy, power = 0.25 * detonation_speed**2, 1.0
     before: tuple[float, float] | None = None  # logarithms of the factor in energy and of what it did to D^2 / D'^2
-    for _ in range(50):
+    for _ in range(ITERATIONS):
         implied = chapman_jouguet_state(eos, initial_density, energy).detonation_speed
         ratio = (detonation_speed / implied) ** 2
         if abs(ratio - 1.0) < 5e-7:

@@ -52,7 +52,7 @@ class MatterState:
     @cached_property
     def sound_speed(self) -> float:
         """Speed of sound [m/s]."""
-        return math.sqrt(float(self.eos.sound_speed_squared(self.eos.record(), self.density, self.energy)))
+        return math.sqrt(float(self.eos.sound_speed_squared(self.eos.record(), float(self.density), self.energy)))
 
     @cached_property
     def isentrope(self) -> Isentrope:
