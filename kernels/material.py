@@ -209,6 +209,7 @@ def update_kernel(
     look_ahead = look_ahead_function(shape, False, strain is Strain.REPROJECTED)
     respond = response_function(eos, burn, unreacted)
     sound_speed_squared = eos.sound_speed_squared
+    equalised = eos.passive_volume
     eos_record = eos.Record
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
@@ -256,7 +257,7 @@ def update_kernel(
             wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
             energy = ZERO
 
-        # Density follows the strain, and inside the material relaxes to room and pressure around it.
+        # Density follows the strain, and inside the material relaxes to the room, and the pressure, around it.
         density = matter.density / (ONE + dt * step.divergence)
         burnt = ONE
         if wp.static(burns):
@@ -267,7 +268,9 @@ def update_kernel(
             onset = (burnt - BURNT_OUT) * PER_BURNT_OUT
             filling = step.around[FILLING]
             if squared > ZERO:
-                excess = (matter.pressure - step.around[PRESSURE]) / (density * squared)
+                excess = ZERO
+                if wp.static(equalised):
+                    excess = (matter.pressure - step.around[PRESSURE]) / (density * squared)
                 crossing = onset * inside(filling) * dt * wp.sqrt(squared) * viscosity.inverse_length
                 density = relax_density(density, filling, excess, crossing)
 

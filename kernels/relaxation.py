@@ -2,7 +2,9 @@
 
 Volumes follow the strain, whose errors add up: particles that fill a cell together may have volumes, and so pressures,
 that differ for no reason. For a gamma law the volume is passive, since p V depends on the energy alone, and the
-relaxation changes what is shown but no motion. What was measured is in docs/numerics.md.
+relaxation changes what is shown but no motion. For other laws it moves matter, as it should: a volume too large has too
+low a pressure, and the error grows until the cell is full. There volumes are not relaxed to equal pressures, because
+differences of pressure even out by motion. What was measured is in docs/numerics.md.
 """
 
 import warp as wp

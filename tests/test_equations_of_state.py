@@ -80,6 +80,14 @@ def test_sound_speed_is_the_slope_of_the_isentrope(eos, density, energy):
     assert float(eos.sound_speed_squared(eos.record(), density, energy)) == pytest.approx(slope, rel=1e-3)
 
 
+@pytest.mark.parametrize("eos", STATES_OF, ids=str)
+def test_passive_volumes(eos):
+    """Whether p V stays when the volume changes at one energy: by more than rounding, or not."""
+    products = [pressure(eos, density, 1e6) / density for density in (0.9 * 1200.0, 1200.0, 1.1 * 1200.0)]
+    passive = np.ptp(products) < 1e-5 * np.abs(products).max()
+    assert passive == eos.passive_volume
+
+
 @pytest.mark.parametrize("gamma", [1.4, 2.0, 3.0])
 @pytest.mark.parametrize(("density", "energy"), STATES)
 def test_ideal_gas(gamma, density, energy):

@@ -12,6 +12,7 @@ import warp as wp
 from scenes_for_tests import (
     OPEN,
     ROUND_OFF,
+    TNT,
     audited,
     block,
     explosive,
@@ -24,6 +25,7 @@ from warp_mpm.config import Transfer
 from warp_mpm.kernels import relaxation
 from warp_mpm.kernels.content import FILLING, PRESSURE
 from warp_mpm.kernels.precision import scalar
+from warp_mpm.materials import Material
 
 SERIES = 3e-4  # of the logarithm and the exponential, for exponents up to 0.6 (see `kernels/relaxation.py`)
 FORMULA = 16 * ROUND_OFF  # an exponent below 1 in size, and its exponential, each rounded a few times
@@ -181,6 +183,30 @@ def test_relaxation_in_a_step(burns, device):
     if device == "cpu":  # on a GPU the order of atomic sums is the machine's
         for name in ("energy", "velocity", "position", "mass"):
             np.testing.assert_array_equal(after[name], strained[name])
+
+
+def test_only_passive_volumes_relax_to_equal_pressures(device):
+    """Where the volume is not passive they relax to the room alone, whatever the pressure around."""
+    products = Material("products", TNT.density, TNT, 4e6)
+
+    def pressure_alone(place):
+        content = sloping(place)
+        content[..., FILLING] = 1.0
+        return content
+
+    def room_alone(place):
+        content = sloping(place)
+        content[..., PRESSURE] = 0.0
+        return content
+
+    scene = block(CELLS, material=products)
+    strained, pressed, roomy, both = (
+        step_from(scene, device, content)[0].state.field("density")
+        for content in (empty, pressure_alone, room_alone, sloping)
+    )
+    np.testing.assert_allclose(pressed, strained, rtol=FORMULA)
+    np.testing.assert_allclose(both, roomy, rtol=FORMULA)
+    assert np.abs(both / strained - 1.0).max() > 0.01
 
 
 @pytest.mark.parametrize(

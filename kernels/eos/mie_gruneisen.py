@@ -83,6 +83,7 @@ class MieGruneisen:
     pressure_offset = pressure_offset
     pressure_slope = pressure_slope
     sound_speed_squared = sound_speed_squared
+    passive_volume = False
 
     def __post_init__(self) -> None:
         """Check the parameters."""
