@@ -17,7 +17,7 @@ from warp_mpm.kernels.content import FILLING, PRESSURE, inside
 from warp_mpm.kernels.motion import Faces, place, settle
 from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Clock, Grid, Maxima, Particles, raise_maxima
-from warp_mpm.kernels.relaxation import relax_density
+from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, relax_density
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
 from warp_mpm.kernels.transfer import look_ahead_function
@@ -209,7 +209,7 @@ def update_kernel(
     look_ahead = look_ahead_function(shape, False, strain is Strain.REPROJECTED)
     respond = response_function(eos, burn, unreacted)
     sound_speed_squared = eos.sound_speed_squared
-    equalised = eos.passive_volume
+    equalisation = PASSIVE_EQUALISATION if eos.passive_volume else ACTIVE_EQUALISATION
     eos_record = eos.Record
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
@@ -268,11 +268,9 @@ def update_kernel(
             onset = (burnt - BURNT_OUT) * PER_BURNT_OUT
             filling = step.around[FILLING]
             if squared > ZERO:
-                excess = ZERO
-                if wp.static(equalised):
-                    excess = (matter.pressure - step.around[PRESSURE]) / (density * squared)
+                excess = (matter.pressure - step.around[PRESSURE]) / (density * squared)
                 crossing = onset * inside(filling) * dt * wp.sqrt(squared) * viscosity.inverse_length
-                density = relax_density(density, filling, excess, crossing)
+                density = relax_density(density, filling, excess, crossing, equalisation)
 
         moved = ZERO
         if wp.static(move):
