@@ -17,7 +17,7 @@ from warp_mpm.kernels.content import FILLING, PRESSURE, inside
 from warp_mpm.kernels.motion import Faces, place, settle
 from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Clock, Grid, Maxima, Particles, raise_maxima
-from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, relax_density
+from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, gas_share, relax_density
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
 from warp_mpm.kernels.transfer import look_ahead_function
@@ -209,7 +209,8 @@ def update_kernel(
     look_ahead = look_ahead_function(shape, False, strain is Strain.REPROJECTED)
     respond = response_function(eos, burn, unreacted)
     sound_speed_squared = eos.sound_speed_squared
-    equalisation = PASSIVE_EQUALISATION if eos.passive_volume else ACTIVE_EQUALISATION
+    passive = eos.passive_volume
+    equalisation = PASSIVE_EQUALISATION if passive else ACTIVE_EQUALISATION
     eos_record = eos.Record
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
@@ -262,14 +263,20 @@ def update_kernel(
         burnt = ONE
         if wp.static(burns):
             burnt = matter.burn_fraction
-        # An ambient pressure pushes on volumes, which the relaxation would then change without doing work.
-        if wp.static(damped) and burnt > BURNT_OUT and ambient_pressure == ZERO:
+        # An ambient pressure pushes on volumes that are passive otherwise: relaxing them would start a motion.
+        relaxes = burnt > BURNT_OUT
+        if wp.static(passive):
+            relaxes = relaxes and ambient_pressure == ZERO
+        if wp.static(damped) and relaxes:
             squared = sound_speed_squared(eos_parameters, density, energy)
             onset = (burnt - BURNT_OUT) * PER_BURNT_OUT
             filling = step.around[FILLING]
             if squared > ZERO:
-                excess = (matter.pressure - step.around[PRESSURE]) / (density * squared)
+                modulus = density * squared
+                excess = (matter.pressure - step.around[PRESSURE]) / modulus
                 crossing = onset * inside(filling) * dt * wp.sqrt(squared) * viscosity.inverse_length
+                if wp.static(not passive):
+                    crossing *= gas_share(matter.pressure - ambient_pressure, modulus)
                 density = relax_density(density, filling, excess, crossing, equalisation)
 
         moved = ZERO

@@ -4,12 +4,14 @@ Volumes follow the strain, whose errors add up: particles that fill a cell toget
 that differ for no reason. For a gamma law the volume is passive, since p V depends on the energy alone, and the
 relaxation changes what is shown but no motion. For other laws it moves matter, as it should: without it errors of the
 volumes add up to errors of the pressure. But relaxing to equal pressures blunts a front there, because those of the
-cells around are smoothed ones, and so it is five times slower. What was measured is in docs/numerics.md.
+cells around are smoothed ones, and so it is five times slower. And a liquid must not be relaxed at all where its
+pressure is small: at a free surface, where cells are never quite full, it would be torn. See `gas_share`; what was
+measured is in docs/numerics.md.
 """
 
 import warp as wp
 
-from warp_mpm.kernels.precision import HALF, ONE, TWO, scalar
+from warp_mpm.kernels.precision import FOUR, HALF, ONE, TWO, ZERO, scalar
 
 RELAXATION = wp.constant(scalar(0.6))  # towards full cells, per cell that sound crosses
 THIRD = wp.constant(scalar(1.0 / 3.0))
@@ -35,6 +37,16 @@ def exponential(value: scalar) -> scalar:
     even = ONE + TWELFTH * value * value
     odd = HALF * value
     return (even + odd) / (even - odd)
+
+
+@wp.func
+def gas_share(pressure: scalar, modulus: scalar) -> scalar:
+    """1 in a gas, down to 0 in a liquid at the pressure of its surroundings, by 4 p / (rho c^2).
+
+    `pressure` [Pa] is that above the ambient one; p / (rho c^2) is 1 / gamma in a gas, 4e-5 in water at 1 bar. A
+    relative error of a volume is one of the pressure rho c^2 / p times as large.
+    """
+    return wp.clamp(FOUR * pressure / modulus, ZERO, ONE)
 
 
 @wp.func
