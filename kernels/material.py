@@ -48,6 +48,7 @@ class Response:
     viscous_pressure: scalar  # its isotropic part [Pa]
     viscous_thrust: vector3  # its directed part is the pressure tensor s s^T [Pa]
     sound_speed: scalar  # of the products, burnt or not; of the mixture where there is an unreacted state [m/s]
+    elastic_speed: scalar  # of small changes of the pressure: 0 where matter not yet burnt has none [m/s]
 
 
 @functools.cache
@@ -102,6 +103,9 @@ def response_function(eos: Any, burn: Any, unreacted: Any = None) -> wp.Function
             squared = burnt * squared + (ONE - burnt) * solid_squared
             onset = ONE
         result.sound_speed = wp.sqrt(wp.max(squared, ZERO))
+        result.elastic_speed = result.sound_speed
+        if wp.static(not resists):
+            result.elastic_speed = wp.sqrt(burnt) * result.sound_speed
         if wp.min(closing, divergence) < ZERO and onset > ZERO:  # nothing closes in most of an expanding gas
             axis = directedness(viscosity, result.sound_speed, divergence) * direction
             share = wp.dot(axis, axis)
@@ -184,7 +188,7 @@ def initial_kernel(eos: Any, burn: Any, unreacted: Any = None) -> wp.Kernel:
             since_booster,
         )
         particles.matter[p].pressure = response.pressure
-        particles.matter[p].sound_speed = wp.sqrt(response.burn_fraction) * response.sound_speed
+        particles.matter[p].sound_speed = response.elastic_speed
         raise_maxima(maxima, slab, rates(response, viscosity, particles.motion[p].velocity, ZERO, ZERO))
         if wp.static(burns):
             particles.matter[p].burn_fraction = response.burn_fraction
@@ -315,7 +319,7 @@ def update_kernel(
         matter.viscous_pressure = response.viscous_pressure
         matter.viscous_thrust = response.viscous_thrust
         matter.burn_fraction = response.burn_fraction
-        matter.sound_speed = wp.sqrt(response.burn_fraction) * response.sound_speed
+        matter.sound_speed = response.elastic_speed
         particles.matter[p] = matter
         raise_maxima(maxima, slab, rates(response, viscosity, motion.velocity, step.divergence, moved))
         if wp.static(burns):
