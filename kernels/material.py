@@ -93,7 +93,7 @@ def response_function(eos: Any, burn: Any, unreacted: Any = None) -> wp.Function
         result.burn_fraction = burnt
         result.pressure = burnt * products
         squared = sound_speed_squared(eos_parameters, density, energy)
-        onset = wp.min(burnt * PER_IGNITED, ONE)
+        pushes_back = burnt > ZERO
         if wp.static(resists):
             thermal = energy - chemical_energy
             solid = unreacted_offset(unreacted_parameters, density)
@@ -101,18 +101,19 @@ def response_function(eos: Any, burn: Any, unreacted: Any = None) -> wp.Function
             result.pressure += (ONE - burnt) * wp.max(solid, ZERO)
             solid_squared = unreacted_sound_squared(unreacted_parameters, density, thermal)
             squared = burnt * squared + (ONE - burnt) * solid_squared
-            onset = ONE
+            pushes_back = True
         result.sound_speed = wp.sqrt(wp.max(squared, ZERO))
         result.elastic_speed = result.sound_speed
         if wp.static(not resists):
             result.elastic_speed = wp.sqrt(burnt) * result.sound_speed
-        if wp.min(closing, divergence) < ZERO and onset > ZERO:  # nothing closes in most of an expanding gas
+        if wp.min(closing, divergence) < ZERO and pushes_back:  # nothing closes in most of an expanding gas
             axis = directedness(viscosity, result.sound_speed, divergence) * direction
             share = wp.dot(axis, axis)
             result.closing_rate = closing_rate(share, closing, divergence)
             length = viscous_length(viscosity, axis)
             q = viscous_pressure(viscosity, length, density, result.sound_speed, result.closing_rate)
-            q *= onset
+            if wp.static(not resists):
+                q *= wp.min(burnt * PER_IGNITED, ONE)
             result.viscous_pressure = q * (ONE - share)
             result.viscous_thrust = wp.sqrt(q) * axis
         return result
