@@ -4,7 +4,7 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.precision import HALF, ZERO, scalar, vector3
+from warp_mpm.kernels.precision import HALF, LAST_FRACTION, ZERO, scalar, vector3
 from warp_mpm.kernels.records import (
     DISPLACEMENT,
     OUTFLOW_LANES,
@@ -21,7 +21,6 @@ from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.transfer import displacement_function
 
 FARTHEST = wp.constant(scalar(4.0))  # cells that a particle may move in one step; more, or NaN, is a fault
-LAST_FRACTION = wp.constant(scalar(0.99999994))  # the largest number below one in single precision
 
 
 @wp.struct

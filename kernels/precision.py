@@ -1,13 +1,22 @@
 """The scalar type of the simulation, the vector types built on it, and the literals that kernels use.
 
-Warp does not promote a float literal to another scalar type, so kernels take their constants from here. Time and the
-audited sums are always double. Only single precision works: host code still calls device functions with Python numbers,
-which Warp does not match to a double `scalar`.
+Types are part of every kernel, so the precision is chosen once, before this module is imported, by the environment
+variable `WARP_MPM_PRECISION`: single (the default) or double. Warp does not promote a float literal to another scalar
+type, so kernels take their constants from here. Time and the audited sums are always double.
 """
+
+import os
 
 import warp as wp
 
-scalar = wp.float32
+VARIABLE = "WARP_MPM_PRECISION"
+SCALARS = {"single": (wp.float32, "float", 24), "double": (wp.float64, "double", 53)}
+
+PRECISION = os.environ.get(VARIABLE) or "single"
+if PRECISION not in SCALARS:
+    raise ValueError(f"{VARIABLE}: expected {' or '.join(SCALARS)}, got {PRECISION!r}")
+
+scalar, REAL, DIGITS = SCALARS[PRECISION]  # the type, its name in C++, its binary digits
 
 vector2 = wp.types.vector(2, scalar)
 vector3 = wp.types.vector(3, scalar)
@@ -22,6 +31,9 @@ THREE_QUARTERS = wp.constant(scalar(0.75))
 ONE = wp.constant(scalar(1.0))
 TWO = wp.constant(scalar(2.0))
 FOUR = wp.constant(scalar(4.0))
+
+LAST_FRACTION = wp.constant(scalar(1.0 - 0.5**DIGITS))
+"""The largest number below one."""
 
 NEVER = wp.constant(scalar(1.0e30))
 """A time that never comes [s]: the arrival time of matter that no detonator lights."""

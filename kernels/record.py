@@ -1,8 +1,8 @@
-"""The record that every step leaves: time, peaks, the pressure in regions and along a line."""
+"""The record that every step leaves: time, peaks, the pressure in regions, along a line and on the section plane."""
 
 import warp as wp
 
-from warp_mpm.kernels.precision import HALF, ZERO, scalar, vector3
+from warp_mpm.kernels.precision import HALF, NEVER, ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import PARTICLE_PRESSURE, Clock, Grid, Maxima
 
 # Lanes at the start of a record's row; regions and points of the line follow.
@@ -75,3 +75,32 @@ def record_step(
     else:
         point = thread - 1 - regions
         rows[row, RECORD_HEAD + regions + point] = interpolate(grid, line_nodes[point], line_fractions[point])
+
+
+@wp.kernel(enable_backward=False)
+def record_section(
+    grid: Grid,
+    clock: wp.array(dtype=Clock),
+    corner: int,
+    stride_u: int,
+    stride_v: int,
+    stride_normal: int,
+    share: scalar,
+    threshold: scalar,
+    last: wp.array2d(dtype=scalar),
+    peak: wp.array2d(dtype=scalar),
+    arrival: wp.array2d(dtype=scalar),
+):
+    """Highest field pressure so far [Pa], and when it first reached the threshold [s], at a node of the section plane.
+
+    The plane lies `share` of a cell above the layer of nodes that begins at `corner`; `last`
+    is the pressure a step ago.
+    """
+    u, v = wp.tid()
+    node = corner + u * stride_u + v * stride_v
+    pressure = (ONE - share) * grid.field[node][0] + share * grid.field[node + stride_normal][0]
+    if pressure >= threshold and arrival[u, v] == NEVER:
+        since = clock[0].dt * (pressure - threshold) / (pressure - last[u, v])
+        arrival[u, v] = scalar(clock[0].time) - since
+    last[u, v] = pressure
+    peak[u, v] = wp.max(peak[u, v], pressure)

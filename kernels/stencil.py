@@ -15,9 +15,7 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.precision import scalar
-
-_CTYPE = "float" if scalar is wp.float32 else "double"
+from warp_mpm.kernels.precision import REAL, scalar
 
 
 def value_type_of(lanes: int) -> type:
@@ -32,22 +30,22 @@ def _condition(plain: bool) -> str:
 
 def _warp_type(lanes: int) -> str:
     """Warp's own type of as many values, in C++."""
-    return _CTYPE if lanes == 1 else f"wp::vec_t<{lanes}, {_CTYPE}>"
+    return REAL if lanes == 1 else f"wp::vec_t<{lanes}, {REAL}>"
 
 
 def _lanes(count: int, plain: bool) -> str:
     """Type `lanes` of as many values, and how to load and add them at a node."""
     return f"""
 #if {_condition(plain)}
-    typedef {_CTYPE} lanes __attribute__((ext_vector_type({count})));
+    typedef {REAL} lanes __attribute__((ext_vector_type({count})));
     auto load = [](const void* node) {{ lanes x; __builtin_memcpy(&x, node, sizeof(x)); return x; }};
     auto add = [=](void* node, lanes x) {{ x += load(node); __builtin_memcpy(node, &x, sizeof(x)); }};
-    auto plus = [](lanes sum, lanes x, {_CTYPE} weight) {{ return __builtin_elementwise_fma(x, (lanes)weight, sum); }};
+    auto plus = [](lanes sum, lanes x, {REAL} weight) {{ return __builtin_elementwise_fma(x, (lanes)weight, sum); }};
 #else
     typedef {_warp_type(count)} lanes;
     auto load = [](const lanes* node) {{ return *node; }};
     auto add = [](lanes* node, lanes x) {{ wp::atomic_add(node, x); }};
-    auto plus = [](lanes sum, lanes x, {_CTYPE} weight) {{ return wp::add(sum, wp::mul(x, weight)); }};
+    auto plus = [](lanes sum, lanes x, {REAL} weight) {{ return wp::add(sum, wp::mul(x, weight)); }};
 #endif
 """
 
@@ -63,10 +61,10 @@ def _scatter_rows(lanes: int, width: int, plain: bool) -> str:
     """
     numbers = 4 if lanes * width <= 4 else 8
     return f"""
-    {_CTYPE} given[{lanes}];
+    {REAL} given[{lanes}];
     memcpy(given, &value, sizeof(given));
 #if {_condition(plain)}
-    typedef {_CTYPE} lanes __attribute__((ext_vector_type({numbers})));
+    typedef {REAL} lanes __attribute__((ext_vector_type({numbers})));
     lanes along = {{}};
     for (int k = 0; k < {width}; ++k)
         for (int lane = 0; lane < {lanes}; ++lane)
@@ -132,7 +130,7 @@ def _gather_gradient(lanes: int, width: int, plain: bool) -> str:
         by_y = plus(by_y, plane_y, stencil.wx[i]);
         by_z = plus(by_z, plane_z, stencil.wx[i]);
     }}
-    wp::mat_t<4, {lanes}, {_CTYPE}> result;
+    wp::mat_t<4, {lanes}, {REAL}> result;
     memcpy(&result.data[0][0], &total, sizeof(lanes));
     memcpy(&result.data[1][0], &by_x, sizeof(lanes));
     memcpy(&result.data[2][0], &by_y, sizeof(lanes));
@@ -165,7 +163,7 @@ def _scatter_gradient(lanes: int, width: int, plain: bool) -> str:
     for (int i = 0; i < {width}; ++i)
         for (int j = 0; j < {width}; ++j) {{
             auto* row = nodes.data + (size_t)(stencil.first + i * stencil.stride_x + j * stencil.stride_y);
-            {_CTYPE} wij = stencil.wx[i] * stencil.wy[j];
+            {REAL} wij = stencil.wx[i] * stencil.wy[j];
             lanes along = plus(nothing, given, wij);
             along = plus(along, by_x, stencil.sx[i] * stencil.wy[j]);
             along = plus(along, by_y, stencil.wx[i] * stencil.sy[j]);
@@ -183,7 +181,10 @@ def _prefetch(width: int) -> str:
         for (int j = 0; j < {width}; ++j) {{
             const char* row = (const char*)(nodes.data + (size_t)(first + i * stride_x + j * stride_y));
             __builtin_prefetch(row, 1);
-            __builtin_prefetch(row + {width} * sizeof(nodes.data[0]) - 1, 1);
+            const size_t size = {width} * sizeof(nodes.data[0]);
+            for (size_t byte = 64; byte + 64 < size; byte += 64)  // cache lines between the first and the last
+                __builtin_prefetch(row + byte, 1);
+            __builtin_prefetch(row + size - 1, 1);
         }}
 #endif
 """

@@ -4,19 +4,16 @@ from typing import Any
 
 import warp as wp
 
-from warp_mpm.kernels.precision import scalar, vector3, vector8
-
-_CTYPE = "float" if scalar is wp.float32 else "double"
-
+from warp_mpm.kernels.precision import REAL, scalar, vector3, vector8
 
 _MULTIPLY_ADD = f"""
 #if defined(__clang__) && !defined(__CUDACC__)
-    typedef {_CTYPE} lanes __attribute__((ext_vector_type(8)));
+    typedef {REAL} lanes __attribute__((ext_vector_type(8)));
     lanes sum, addend;
     __builtin_memcpy(&sum, &total, sizeof(sum));
     __builtin_memcpy(&addend, &value, sizeof(addend));
     sum += weight * addend;
-    wp::vec_t<8, {_CTYPE}> result;
+    wp::vec_t<8, {REAL}> result;
     __builtin_memcpy(&result, &sum, sizeof(sum));
     return result;
 #else

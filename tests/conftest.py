@@ -6,6 +6,7 @@ import warp as wp
 from warp_mpm.warp_startup import start_quietly
 
 start_quietly()
+pytest.register_assert_rewrite("usd_checks")  # so that its assertions, too, say what they found
 
 
 @pytest.fixture(params=[device.alias for device in wp.get_devices()])

@@ -70,6 +70,9 @@ MISTAKES = [
     (("export", "nowhere"), "the following arguments are required: --to"),
     (("export", "nowhere", "--to", "x.pvd"), "export: expected a run directory or a USD file, got 'nowhere'"),
     (("export", ".", "--to", "x.obj"), "export: --to: expected a file that ends in .pvd or .glb, or a directory"),
+    (("figures", "nowhere"), "load: expected a run directory or a USD file, got 'nowhere'"),
+    (("figures", "."), "which has neither"),
+    (("figures", ".", "--animate", "avi"), "argument --animate: invalid choice: 'avi'"),
     (("run", "two_pont"), "expected a scene file, or one of"),
     (("run", "nowhere/two_point.py"), "got 'nowhere/two_point.py'"),
     ((*RUN, "cel_size=1"), "scene two_point: expected one of cell_size"),
@@ -94,6 +97,11 @@ MISTAKES = [
     (("run", "two_point", "--solver", "order=usf"), "solver: order: expected musl with transfer=damped_flip"),
     (("run", "two_point", "--frames", "1"), "save: frames: expected at least 2"),
     (("run", "two_point", "--frames", "many"), "argument --frames: invalid int value: 'many'"),
+    (("run", "two_point", "--layout", "split"), "argument --layout: invalid choice: 'split'"),
+    (("run", "two_point", "--particles-every", "0"), "save: particles_every: expected a whole number of at least 1"),
+    (("run", "two_point", "--isosurface", "0"), "save: isosurface: expected a positive number, got 0.0"),
+    (("run", "two_point", "--isosurface", "nan"), "save: isosurface: expected a positive number, got nan"),
+    (("run", "two_point", "--fields", "density", "hue"), "save: fields: expected any of density, burn_fraction"),
     (("run", "two_point", "--threads", "0"), "threads: expected a whole number of at least 1, got 0"),
     (("run", "two_point", "--device", "abacus", "--set", *COARSE), "abacus"),
 ]
@@ -173,7 +181,7 @@ def test_other_ends_are_one_line_too(capfd, monkeypatch, raised, exit_code, text
     assert errors.count("\n") == 1
 
 
-def test_run_then_info_and_export(capfd, tmp_path, monkeypatch):
+def test_run_then_info_figures_and_export(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "two_point", "--set", *COARSE, "--frames", "2", "--solver", "burn_width=2"]) == 0
     output, errors = capfd.readouterr()
@@ -188,6 +196,20 @@ def test_run_then_info_and_export(capfd, tmp_path, monkeypatch):
     assert main(["export", os.path.join("out", "two_point"), "--frame", "1", "--to", "two_point.glb"]) == 0
     assert capfd.readouterr().out == "two_point.glb\n"
     assert Path("two_point.glb").read_bytes()[:4] == b"glTF"
+    assert main(["figures", os.path.join("out", "two_point"), "energy", "gauges", "-o", "again"]) == 0
+    assert capfd.readouterr().out == "energy.png, gauges.png in again\n"
+    assert "got 'x'" in mistake(capfd, "figures", os.path.join("out", "two_point"), "x")
+
+
+def test_what_the_usd_file_holds_can_be_chosen(capfd, tmp_path):
+    layout = ["--layout", "clips", "--usdz", "--particles-every", "3"]
+    contents = ["--fields", "density", "arrival_time", "--isosurface", "1e9"]
+    assert main(["run", "two_point", "--set", *COARSE, "--frames", "2", "-o", str(tmp_path), *layout, *contents]) == 0
+    assert main(["info", str(tmp_path / "two_point.usda")]) == 0
+    text = capfd.readouterr().out
+    for words in ("density", "arrival_time", "/World/isosurface", "particlesEvery: 3"):
+        assert words in text
+    assert (tmp_path / "two_point.usdz").exists()
 
 
 def test_importing_the_package_is_light():

@@ -32,11 +32,10 @@ from warp_mpm.config import ShapeFunction
 from warp_mpm.geometry import Box
 from warp_mpm.kernels import content
 from warp_mpm.kernels.content import FILLING, PRESSURE
-from warp_mpm.kernels.precision import scalar, vector2
+from warp_mpm.kernels.precision import LAST_FRACTION, scalar, vector2
 from warp_mpm.kernels.records import Grid, Particles
 from warp_mpm.kernels.shape import offset_nearest_node
 from warp_mpm.scene import Wall, Walls
-from warp_mpm.state import LAST_FRACTION
 
 # Sums of some hundred rounded terms, in an order of the machine's choice, relative to their largest value.
 SUMMED = 32 * ROUND_OFF
@@ -74,7 +73,7 @@ def stir(state):
     random = np.random.default_rng(11)
     n = state.count
     fraction = random.random((n, 3)).astype(np.float32)
-    special = random.choice([0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(0.0)), LAST_FRACTION], (n, 3))
+    special = random.choice([0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(0.0)), float(LAST_FRACTION)], (n, 3))
     state.assign("fraction", np.where(random.random((n, 3)) < 0.1, special, fraction).astype(np.float32))
     state.assign("cell", random.integers(0, state.model.scene.domain.cells, (n, 3)).astype(np.int16))
     state.assign("mass", (state.values("mass") * random.uniform(0.5, 2.0, n)).astype(np.float32))
@@ -120,7 +119,7 @@ def tents_kernel(fractions: wp.array(dtype=scalar), rows: wp.array2d(dtype=scala
 def test_tents(device):
     """Two weights that are not negative, sum to one and put the particle where it is, between the two centres."""
     fractions = np.random.default_rng(3).random(1000).astype(np.float32)
-    fractions[:5] = [0.0, 0.25, 0.5, np.nextafter(np.float32(0.5), np.float32(0.0)), LAST_FRACTION]
+    fractions[:5] = [0.0, 0.25, 0.5, np.nextafter(np.float32(0.5), np.float32(0.0)), float(LAST_FRACTION)]
     rows = wp.zeros((len(fractions), 3), dtype=scalar, device=device)
     wp.launch(tents_kernel, len(fractions), inputs=[wp.array(fractions, device=device), rows], device=device)
     lowest, *weights = rows.numpy().astype(np.float64).T

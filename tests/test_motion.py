@@ -11,9 +11,9 @@ from warp_mpm import simulation
 from warp_mpm.errors import SimulationError
 from warp_mpm.guards import check_faults
 from warp_mpm.kernels import motion
-from warp_mpm.kernels.precision import scalar, vector3
+from warp_mpm.kernels.precision import LAST_FRACTION, scalar, vector3
 from warp_mpm.simulation import simulate
-from warp_mpm.state import LAST_FRACTION, State
+from warp_mpm.state import State
 
 
 @functools.cache
@@ -82,7 +82,7 @@ def test_no_particle_passes_a_wall(cell, fraction, way, device):
     """Y faces are walls here: what would cross one by round-off, or more, stays on it."""
     row = placed((4, cell, 5), (0.5, fraction, 0.5), (0.0, way, 0.0), device)
     assert row[1] == cell
-    assert row[4] == (0.0 if way < 0.0 else LAST_FRACTION)
+    assert row[4] == (0.0 if way < 0.0 else float(LAST_FRACTION))
     assert row[6] == -1.0
     assert row[7] == 0.0
 

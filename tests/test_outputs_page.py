@@ -5,9 +5,11 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from warp_mpm.config import Save
+from warp_mpm.output.figures import PICTURES
 from warp_mpm.scene import FACE_NAMES
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import simulate
@@ -52,6 +54,21 @@ def test_every_key_of_the_summary(run):
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     keys = {*summary, *summary["charges"][0], *next(iter(summary["gauges"].values()))}
     assert sorted(keys - named(r"summary\.json")) == []
+
+
+def test_every_key_of_the_setup(run):
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+    assert sorted(set(summary["setup"]) - {"description"} - named(r"summary\.json")) == []
+
+
+def test_every_array_of_every_step(run):
+    with np.load(run / "steps.npz") as steps:
+        assert sorted(set(steps.files) - named(r"steps\.npz")) == []
+
+
+def test_every_picture(run):
+    assert sorted({file.name for file in (run / "figures").iterdir()} ^ {f"{name}.png" for name in PICTURES}) == []
+    assert sorted({f"{name}.png" for name in PICTURES} - named("Pictures")) == []
 
 
 def test_every_column(run):

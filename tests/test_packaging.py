@@ -18,7 +18,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 LINKS = {"warp_mpm/kernels": "../kernels", "warp_mpm/scenes": "../scenes"}
-DISTRIBUTION_OF = {"warp": "warp-lang", "pxr": "usd-core"}  # where it is not called as its module
+# Where it is not called as its module.
+DISTRIBUTION_OF = {"warp": "warp-lang", "pxr": "usd-core", "PIL": "pillow", "vtkmodules": "vtk"}
 
 
 def run(*command, cwd):

@@ -5,6 +5,8 @@ V_i being the node's share of the domain; from 0.8 to 0.95 full the divisor goes
 (`kernels/grid.py`). Nodes less than half filled stay out of peaks.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes_for_tests import CELL, OPEN, ROUND_OFF, advance, block, inert_gas, nodes, particle_values, scatter, start
@@ -15,7 +17,8 @@ from warp_mpm.detonators import PointDetonator
 from warp_mpm.geometry import Box
 from warp_mpm.materials import ammonium_nitrate
 from warp_mpm.recorder import Recorder, nodes_near_point, nodes_near_segment
-from warp_mpm.scene import Domain, Segment
+from warp_mpm.scene import Domain, SectionPlane, Segment
+from warp_mpm.section import section_pressure
 
 DOMAIN = Domain((-0.01, 0.0, 0.0), (0.09, 0.06, 0.02), (10, 4, 2))  # cells of 10 x 15 x 10 mm
 
@@ -153,11 +156,42 @@ def test_regions_and_lines(device):
     assert np.diff(line.distance).max() <= 1.01 * min(DOMAIN.spacing)
 
 
-def advance_clock(state):
-    """Count a step, as `start_step` does."""
+def advance_clock(state, time=0.0):
+    """Count a step that ends at a time [s], as `start_step` does."""
     clock = state.clock.numpy().copy()
     clock["step"] += 1
+    clock["dt"] = time - clock["time"]
+    clock["time"] = time
     state.clock.assign(clock)
+
+
+@pytest.mark.parametrize("plane", [SectionPlane(0, 0.013), SectionPlane(1, 0.06), SectionPlane(2, 0.0125)])
+def test_peak_and_arrival_on_the_section(device, plane):
+    """A front arrives where 5 % of p_CJ are reached; between steps, and between layers of nodes, pressure is linear."""
+    scene = replace(recorded_scene(), section=plane)
+    solver = start(scene, device)
+    recorder = Recorder(solver.state)
+    place = node_places()
+    height = place[..., plane.axis]
+    begin = 1e-6 + np.delete(place, plane.axis, axis=-1) @ [40e-6, 50e-6]  # [s]
+    threshold = 0.05 * scene.charges[0].material.cj.pressure
+    times = [0.0, 2.1e-6, 3e-6, 4.5e-6, 5e-6]
+    highest = 0.0
+    for time in times:
+        if time > 0.0:
+            advance_clock(solver.state, time)
+        grown = threshold / 1e-6 * (1.0 + 10.0 * height) * (time - begin)
+        fill_grid(solver.state, grown if time < times[-1] else 0.7 * grown, np.zeros(height.shape))
+        highest = np.maximum(highest, section_pressure(solver.state))
+        recorder.record()
+    section = recorder.result().section
+    np.testing.assert_allclose(section.peak, highest, rtol=4 * ROUND_OFF)
+    arrival = begin.take(0, axis=plane.axis) + 1e-6 / (1.0 + 10.0 * plane.coordinate)
+    came = arrival < times[-2]
+    assert came.any()
+    assert not came.all()
+    np.testing.assert_allclose(section.arrival[came], arrival[came], rtol=64 * ROUND_OFF)
+    assert np.isnan(section.arrival[arrival > times[-1]]).all()
 
 
 @pytest.mark.parametrize("reach", [1.0, 2.0])

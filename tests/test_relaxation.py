@@ -25,6 +25,7 @@ from scenes_for_tests import (
 from warp_mpm.config import Transfer
 from warp_mpm.kernels import relaxation
 from warp_mpm.kernels.content import FILLING, PRESSURE
+from warp_mpm.kernels.eos import evaluate
 from warp_mpm.kernels.precision import scalar
 from warp_mpm.material_library import water
 from warp_mpm.materials import Material
@@ -202,9 +203,8 @@ def test_volumes_that_are_not_passive_relax_slowly_to_equal_pressures(ambient, d
     scene = block(CELLS, material=products, walls=OPEN, margin_cells=3, ambient_pressure=ambient)
     (relaxed, before), (strained, _) = (step_from(scene, device, content) for content in (full, empty))
     after, without = particle_values(relaxed.state), particle_values(strained.state)
-    record, densities = TNT.record(), without["density"].tolist()
-    energies = without["energy"].tolist()
-    squared = np.array([TNT.sound_speed_squared(record, *state) for state in zip(densities, energies, strict=True)])
+    states = zip(without["density"].tolist(), without["energy"].tolist(), strict=True)
+    squared = np.array([evaluate(TNT, TNT.sound_speed_squared, *state) for state in states])
     excess = (before["pressure"] - full(before["position"])[:, PRESSURE]) / (without["density"] * squared)
     dt, length = float(relaxed.state.clock_values()["dt"]), scene.domain.cell_volume ** (1 / 3)
     share = np.clip(4.0 * (before["pressure"] - ambient) / (without["density"] * squared), 0.0, 1.0)

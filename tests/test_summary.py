@@ -9,14 +9,14 @@ from scenes_for_tests import explosive
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.detonators import PlaneDetonator, PointDetonator
 from warp_mpm.geometry import Box
-from warp_mpm.output.frame import LineRecord
-from warp_mpm.recorder import StepRecord
+from warp_mpm.output.frame import LineRecord, SectionRecord, StepRecord
 from warp_mpm.scene import Segment
 from warp_mpm.summary import arrival_times, figures_of_merit, ideal_arrival, lit_explosive
 
 SPEED = 2800.0
 DELAY = 2e-6  # [s] of the right detonator
 LENGTH = 0.2  # [m]
+NO_SECTION = SectionRecord(np.zeros((0, 0)), np.zeros((0, 0)))
 MET = LENGTH / 2 + SPEED * DELAY / 2  # where the two fronts meet
 
 
@@ -55,6 +55,7 @@ def front_record(scene, speed, lag, height):
         point_pressures=np.linspace(0.0, 2.4 * height, 400)[:, None],
         path=path,
         line=line,
+        section=NO_SECTION,
     )
 
 
@@ -117,7 +118,7 @@ def test_what_does_not_apply_is_none():
     builder.end_time(1e-5)
     scene = builder.build()
     ones = np.ones(3)
-    record = StepRecord(ones, ones, ones, ones, None, np.zeros((3, 0)), None, None)
+    record = StepRecord(ones, ones, ones, ones, None, np.zeros((3, 0)), None, None, NO_SECTION)
     figures = figures_of_merit(scene, record)
     assert figures["collision_pressures_pa"] == []
     for name in ("front_pressure_pa", "front_speed_m_s", "front_offset_m", "collision_pressure_pa"):

@@ -30,10 +30,9 @@ from warp_mpm.config import Order, ShapeFunction, Transfer
 from warp_mpm.kernels import transfer
 from warp_mpm.kernels.content import FILLING, PRESSURE
 from warp_mpm.kernels.motion import move_kernel
-from warp_mpm.kernels.precision import scalar
+from warp_mpm.kernels.precision import LAST_FRACTION, scalar
 from warp_mpm.kernels.records import Clock, Grid, Particles
 from warp_mpm.kernels.strain import Strain, strain_function
-from warp_mpm.state import LAST_FRACTION
 
 SUMMED = 32 * ROUND_OFF
 DT = 1e-6  # [s]
@@ -54,7 +53,7 @@ def scatter_particles(state):
     n = state.count
     fraction = random.random((n, 3)).astype(np.float32)
     fraction[: n // 8] = 0.0
-    fraction[n // 8 : n // 4] = LAST_FRACTION
+    fraction[n // 8 : n // 4] = float(LAST_FRACTION)
     state.assign("fraction", fraction)
     state.assign("velocity", random.normal(0.0, 100.0, (n, 3)).astype(np.float32))
     state.assign("mass", (state.values("mass") * random.uniform(0.5, 2.0, n)).astype(np.float32))

@@ -1,65 +1,16 @@
 """The USD file, read back: prims, lengths, types, times, units; and what a killed or failing run leaves."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from matplotlib import colormaps
-from pxr import Gf, Usd, UsdGeom, UsdShade, UsdValidation
-from scenes_for_tests import CELL, OPEN, block
+from pxr import Gf, Usd, UsdGeom, UsdShade
+from scenes_for_tests import CELL, block
+from usd_checks import ALLOWED, sample_codes
+from usd_frames import FIELDS, FRAMES, LEFT, RANGE, frame_of, open_scene, written
 
-from warp_mpm.detonators import PlaneDetonator, PointDetonator
 from warp_mpm.errors import SimulationError
 from warp_mpm.output import colormap, usd
 from warp_mpm.output.frame import Frame
 from warp_mpm.output.usd import UsdWriter
-from warp_mpm.scene import Scene
-
-RANGE = (0.0, 4.0e9)  # [Pa]
-FIELDS = ("density", "particleVelocity")
-FRAMES = 3
-LEFT = 5  # the particle that leaves, in the last frame
-END_TIME = 20e-6  # [s]
-ALLOWED = {"float[]", "int[]", "float3[]", "color3f[]"}
-
-
-def open_scene() -> Scene:
-    """A plate of 8 x 6 x 2 cells in vacuum, with a delayed point detonator and a plane one."""
-    detonators = (
-        PointDetonator((0.0, 0.03, 0.01), time=1e-6),
-        PlaneDetonator((0.08, 0.0, 0.0), (1.0, 0.0, 0.0), time=2e-6),
-    )
-    return block((8, 6, 2), detonators=detonators, walls=OPEN, margin_cells=2, end_time=END_TIME)
-
-
-def section_of(scene: Scene) -> np.ndarray:
-    """A pressure [Pa] that names its node: 1e6 i + 1e3 j."""
-    nodes = [scene.domain.cells[axis] + 1 for axis in scene.section.in_plane]
-    i, j = np.indices(nodes)
-    return (1e6 * i + 1e3 * j).astype(np.float32)
-
-
-def frame_of(scene: Scene, index: int) -> Frame:
-    """Gas that drifts along x, with pressures in and beyond the range; one particle leaves in the last frame."""
-    count = scene.particle_count
-    position = np.concatenate([charge.positions for charge in scene.charges]) + index * np.array([1e-3, 0.0, 0.0])
-    inside = np.ones(count, dtype=bool)
-    inside[LEFT] = index < FRAMES - 1
-    fields = {
-        "density": np.linspace(900.0, 1100.0, count, dtype=np.float32),
-        "particleVelocity": np.full((count, 3), index, dtype=np.float32),
-    }
-    pressure = np.linspace(-1e9, 5e9, count, dtype=np.float32) * np.float32(index + 1)
-    time = END_TIME * index / (FRAMES - 1)
-    return Frame(index, time, position.astype(np.float32), pressure, inside, section_of(scene), fields)
-
-
-def written(path: Path, scene: Scene, frames: int = FRAMES) -> UsdWriter:
-    """A writer after some frames, not closed."""
-    writer = UsdWriter(path, scene, pressure_range=RANGE, frames=FRAMES, fields=FIELDS)
-    for index in range(frames):
-        writer.write(frame_of(scene, index))
-    return writer
 
 
 @pytest.fixture(scope="module")
@@ -227,18 +178,6 @@ def test_material_glows_in_the_colors_of_the_pressure_and_reflects_no_light(stag
         assert surface.GetInput("ior").Get() == 1.0
 
 
-def test_validators_find_nothing(stage):
-    validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
-    assert len(validators) > 10
-    errors = UsdValidation.ValidationContext(validators).Validate(stage)
-    assert [error.GetMessage() for error in errors] == []
-
-
-def sample_codes(attribute):
-    """Time codes of an attribute's samples; USD 26.8 adds one just before that of a lone clip, at -4e-9."""
-    return sorted({round(code, 6) for code in attribute.GetTimeSamples()})
-
-
 @pytest.mark.parametrize("frames", [1, 2])
 def test_a_killed_run_keeps_its_frames(scene, tmp_path, frames):
     written(tmp_path / "block.usdc", scene, frames)  # and never closed
@@ -313,18 +252,3 @@ def test_an_array_of_the_wrong_length_is_refused(scene, tmp_path):
     frame = frame_of(scene, 0)
     with pytest.raises(ValueError, match="pressure: expected shape"):
         writer.write(Frame(0, 0.0, frame.position, frame.pressure[:-1], frame.inside, frame.section))
-
-
-def test_color_table_is_inferno():
-    np.testing.assert_allclose(colormap.srgb_table(), colormaps["inferno"].colors, atol=0.5 / 255)
-    np.testing.assert_allclose(
-        colormap.linear_table()[[0, 255]], [[0, 0, 4 / 255 / 12.92], [0.9734, 1, 0.3712]], atol=1e-4
-    )
-
-
-def test_color_indices():
-    pressure = np.array([-1.0, 0.0, 1.0, 1.9, 2.1, 255.9, 256.0, 1e30, np.inf, -np.inf, np.nan], dtype=np.float32)
-    expected = [0, 0, 1, 1, 2, 255, 255, 255, 255, 0, 0]
-    indices = colormap.indices(pressure, 0.0, 256.0)
-    assert indices.dtype == np.int32
-    np.testing.assert_array_equal(indices, expected)

@@ -1,11 +1,13 @@
 """Measures how accurate the solver is: the tables of the README.
 
-    python tools/accuracy.py taylor    planar Taylor wave against its exact solution (2 minutes)
-    python tools/accuracy.py paper     the paper's two scenes, rigid and free, with refinement (8 minutes)
-    python tools/accuracy.py vacuum    gas that expands freely for a long time (6 minutes)
-    python tools/accuracy.py box       a closed box for a millisecond (6 minutes)
+    python tools/accuracy.py taylor     planar Taylor wave against its exact solution (2 minutes)
+    python tools/accuracy.py paper      the paper's two scenes, rigid and free, with refinement (8 minutes)
+    python tools/accuracy.py vacuum     gas that expands freely for a long time (6 minutes)
+    python tools/accuracy.py box        a closed box for a millisecond (6 minutes)
+    python tools/accuracy.py precision  what round-off does to the paper's scenes (3 minutes)
 
-Times are for 2 CPU cores. One set of solver defaults everywhere; what differs is in the first column.
+Times are for 2 CPU cores. One set of solver defaults everywhere; what differs is in the first column. All of it is in
+the precision that the environment variable WARP_MPM_PRECISION names.
 """
 
 import sys
@@ -18,6 +20,7 @@ from rich.table import Table
 
 import warp_mpm as mpm
 from warp_mpm.exact.taylor_wave import PlanarTaylorWave
+from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.parameters import annotations_of, from_text
 from warp_mpm.verification import pressure_error
 
@@ -45,6 +48,13 @@ PAPER_RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
     ("two_point", {"confinement": "free"}),
     ("six_point", {}),
     ("six_point", {"confinement": "free"}),
+)
+PRECISION_RUNS: tuple[tuple[str, Mapping[str, Any]], ...] = (
+    ("two_point", {"cell_size": 6e-3}),
+    ("two_point", {"cell_size": 6e-3, "confinement": "free"}),
+    ("two_point", {"cell_size": 4e-3, "confinement": "free"}),
+    ("two_point", {"cell_size": 3e-3, "confinement": "free"}),
+    ("six_point", {"cell_size": 4e-3, "confinement": "free"}),
 )
 VACUUM_RUNS: tuple[Mapping[str, Any], ...] = ({"margin": 1.0, "end_time": 300e-6}, {"end_time": 500e-6})
 BOX_RUNS = ((6e-3, ""), (4e-3, ""), (3e-3, ""), (6e-3, "transfer=flip"))
@@ -94,7 +104,17 @@ def taylor_table(console: Console) -> Table:
 
 
 def paper_table(console: Console) -> Table:
-    """Front and collision pressures of the paper's scenes, conservation errors, and mirror symmetry."""
+    """The paper's scenes, with refinement."""
+    return _scene_table(console, "paper", PAPER_RUNS)
+
+
+def precision_table(console: Console) -> Table:
+    """The paper's scenes where round-off shows, small ones among them: to be run in single and in double precision."""
+    return _scene_table(console, "precision", PRECISION_RUNS)
+
+
+def _scene_table(console: Console, heading: str, runs: tuple[tuple[str, Mapping[str, Any]], ...]) -> Table:
+    """Front and collision pressures of scenes of the paper, conservation errors, and mirror symmetry."""
     columns = (
         "front",
         "gauges",
@@ -109,13 +129,13 @@ def paper_table(console: Console) -> Table:
         "mass",
     )
     table = _table(
-        "The paper's scenes at the defaults: pressures in GPa, residual and offset of the front in cells, mirror "
-        "asymmetry in p_CJ over all nodes, and away from open faces",
+        f"The paper's scenes at the defaults, in {PRECISION} precision: pressures in GPa, residual and offset of the "
+        "front in cells, mirror asymmetry in p_CJ over all nodes, and away from open faces",
         ("scene", *columns, "momentum", "s"),
     )
-    for name, parameters in PAPER_RUNS:
+    for name, parameters in runs:
         label = _label(name, parameters)
-        console.print(f"paper: {label}")
+        console.print(f"{heading}: {label}")
         scene = mpm.load_scene(name, **parameters)
         result = mpm.simulate(scene, save=mpm.Save(frames=31))
         figures = result.summary
@@ -204,6 +224,7 @@ TABLES: dict[str, Callable[[Console], Table]] = {
     "paper": paper_table,
     "vacuum": vacuum_table,
     "box": box_table,
+    "precision": precision_table,
 }
 
 

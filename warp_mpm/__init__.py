@@ -3,6 +3,7 @@
     import warp_mpm as mpm
     scene = mpm.load_scene("two_point", cell_size=6e-3)
     result = mpm.simulate(scene, output="out/two_point")
+    run = mpm.load("out/two_point")
 
 Names are imported when they are first used, so that `warp-mpm --help` does not wait for Warp.
 """
@@ -14,7 +15,7 @@ from warp_mpm import version
 
 if TYPE_CHECKING:
     from warp_mpm.builder import SceneBuilder
-    from warp_mpm.config import Order, Save, ShapeFunction, SolverConfig, Transfer
+    from warp_mpm.config import Layout, Order, Save, ShapeFunction, SolverConfig, Transfer
     from warp_mpm.detonators import PlaneDetonator, PointDetonator
     from warp_mpm.errors import InputError, SimulationError
     from warp_mpm.geometry import Box, Cylinder, Sphere
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from warp_mpm.material_files import load_materials
     from warp_mpm.material_library import air, find_material, library, water
     from warp_mpm.materials import Burn, Material, OnMismatch, ammonium_nitrate, explosive, inert
+    from warp_mpm.run_directory import Run, load
     from warp_mpm.scene import Scene, Wall, Walls
     from warp_mpm.scene_loading import list_scenes, load_scene
     from warp_mpm.simulation import Result, simulate
@@ -38,6 +40,7 @@ __all__ = [
     "Cylinder",
     "IdealGas",
     "InputError",
+    "Layout",
     "Material",
     "MieGruneisen",
     "OnMismatch",
@@ -45,6 +48,7 @@ __all__ = [
     "PlaneDetonator",
     "PointDetonator",
     "Result",
+    "Run",
     "Save",
     "Scene",
     "SceneBuilder",
@@ -64,6 +68,7 @@ __all__ = [
     "inert",
     "library",
     "list_scenes",
+    "load",
     "load_materials",
     "load_scene",
     "simulate",
@@ -72,7 +77,7 @@ __all__ = [
 
 _HOMES = {
     "builder": ("SceneBuilder",),
-    "config": ("Order", "Save", "ShapeFunction", "SolverConfig", "Transfer"),
+    "config": ("Layout", "Order", "Save", "ShapeFunction", "SolverConfig", "Transfer"),
     "detonators": ("PlaneDetonator", "PointDetonator"),
     "errors": ("InputError", "SimulationError"),
     "geometry": ("Box", "Cylinder", "Sphere"),
@@ -83,6 +88,7 @@ _HOMES = {
     "material_files": ("load_materials",),
     "material_library": ("air", "find_material", "library", "water"),
     "materials": ("Burn", "Material", "OnMismatch", "ammonium_nitrate", "explosive", "inert"),
+    "run_directory": ("Run", "load"),
     "scene": ("Scene", "Wall", "Walls"),
     "scene_loading": ("list_scenes", "load_scene"),
     "simulation": ("Result", "simulate"),

@@ -6,14 +6,15 @@ Modules that take long to import are imported where they are used: `list` and `-
 """
 
 import argparse
+import os
 import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from warp_mpm.checks import count, mistake
-from warp_mpm.config import Save, SolverConfig
+from warp_mpm.config import PARTICLE_FIELDS, Layout, Save, SolverConfig
 from warp_mpm.errors import InputError, SimulationError, VerificationError
 from warp_mpm.parameters import annotations_of, from_text
 from warp_mpm.version import VERSION
@@ -76,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("scene", metavar="SCENE", help="a scene file, or a name that 'warp-mpm list' shows")
     run.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: out/<scene>)")
     _add_settings(run, "--set", "parameters of the scene, e.g. cell_size=6e-3 confinement=free")
-    run.add_argument("--frames", type=int, default=Save().frames, help="saved frames (default: %(default)s)")
+    _add_saving(run)
     _add_solving(run)
 
     scenes = commands.add_parser("list", parents=[common], help="list scenes", description="List scenes.")
@@ -88,17 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     materials.set_defaults(command=_materials)
     materials.add_argument("file", metavar="FILE", nargs="?", help="a TOML file of materials (default: the library)")
 
-    info = commands.add_parser("info", parents=[common], help="describe a result", description="Describe a result.")
-    info.set_defaults(command=_info)
-    info.add_argument("path", metavar="PATH", type=Path, help="a run directory or a USD file")
-
-    text = "Write frames of a run, finished or killed, for other programs: .pvd for ParaView, .glb for the web."
-    export = commands.add_parser("export", parents=[common], help="write a result as .pvd or .glb", description=text)
-    export.set_defaults(command=_export)
-    export.add_argument("path", metavar="RUN", type=Path, help="a run directory or a USD file")
-    to = "a .pvd or .glb file, or a directory for a .pvd"
-    export.add_argument("--to", metavar="FILE", type=Path, required=True, help=to)
-    export.add_argument("--frame", metavar="K", type=int, help="one frame, from 0 (.pvd: default all; .glb: needed)")
+    _add_result_commands(commands, common)
 
     text = "Solve problems with exact answers: error tables, pictures, and exit code 1 when a bound is broken."
     check = commands.add_parser("verify", parents=[common], help="compare with exact solutions", description=text)
@@ -112,11 +103,100 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_result_commands(commands: Any, common: argparse.ArgumentParser) -> None:
+    """The commands that look at what a run left."""
+    info = commands.add_parser("info", parents=[common], help="describe a result", description="Describe a result.")
+    info.set_defaults(command=_info)
+    info.add_argument("path", metavar="PATH", type=Path, help="a run directory or a USD file")
+
+    text = "Write frames of a run, finished or killed, for other programs: .pvd for ParaView, .glb for the web."
+    export = commands.add_parser("export", parents=[common], help="write a result as .pvd or .glb", description=text)
+    export.set_defaults(command=_export)
+    export.add_argument("path", metavar="RUN", type=Path, help="a run directory or a USD file")
+    to = "a .pvd or .glb file, or a directory for a .pvd"
+    export.add_argument("--to", metavar="FILE", type=Path, required=True, help=to)
+    export.add_argument("--frame", metavar="K", type=int, help="one frame, from 0 (.pvd: default all; .glb: needed)")
+
+    text = "Draw the pictures of a run again, from what it left in its directory."
+    figures = commands.add_parser("figures", parents=[common], help="draw the pictures of a run", description=text)
+    figures.set_defaults(command=_figures)
+    figures.add_argument("directory", metavar="DIR", type=Path, help="a run directory")
+    figures.add_argument("names", metavar="PICTURE", nargs="*", help="field, section, ... (default: all there are)")
+    figures.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: DIR/figures)")
+    figures.add_argument("--animate", choices=("gif", "mp4"), help="field and section at every frame, too")
+
+
+def _add_saving(parser: argparse.ArgumentParser) -> None:
+    """The options that say what is saved."""
+    default = Save()
+    parser.add_argument("--frames", type=int, default=default.frames, help="saved frames (default: %(default)s)")
+    parser.add_argument(
+        "--fields",
+        metavar="FIELD",
+        nargs="+",
+        default=list(default.fields),
+        help=f"further particle fields in the USD file: {', '.join(PARTICLE_FIELDS)}",
+    )
+    parser.add_argument(
+        "--layout",
+        choices=[layout.value for layout in Layout],
+        default=default.layout.value,
+        help="the USD file: in one, as one clip a frame, or (auto) in one if it is below about 1 GB",
+    )
+    parser.add_argument(
+        "--particles-every",
+        metavar="K",
+        type=int,
+        default=default.particles_every,
+        help="one particle in K in the USD file; the section stays whole (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--isosurface",
+        metavar="PRESSURE_PA",
+        type=float,
+        help="also show in the USD file where the pressure has this value [Pa]",
+    )
+    parser.add_argument("--usdz", action="store_true", help="also pack the USD file into a .usdz")
+
+
+def _save(options: argparse.Namespace) -> Save:
+    """What a command saves.
+
+    Raises:
+        InputError: a value is out of range, or a field is unknown.
+    """
+    return Save(
+        frames=options.frames,
+        fields=tuple(options.fields),
+        layout=Layout(options.layout),
+        particles_every=options.particles_every,
+        isosurface=options.isosurface,
+        usdz=options.usdz,
+    )
+
+
 def _add_solving(parser: argparse.ArgumentParser) -> None:
     """The options that say how something is solved."""
     _add_settings(parser, "--solver", "settings of the solver, e.g. shape=linear viscosity=1.5,0.06")
     parser.add_argument("--device", help="cpu, cuda:0, ... (default: the GPU if there is one)")
     parser.add_argument("--threads", type=int, help="threads on a CPU (default: one per core)")
+    parser.add_argument("--precision", help="single or double (default: WARP_MPM_PRECISION, or single)")
+
+
+def _choose_precision(precision: str | None) -> None:
+    """Have the kernels made in a precision, which is that of the whole process; if none is given, as they would be.
+
+    Raises:
+        InputError: there is no such precision, or this process has kernels of the other one.
+    """
+    if precision is not None:
+        os.environ["WARP_MPM_PRECISION"] = precision
+    try:
+        from warp_mpm.kernels.precision import PRECISION
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    if precision not in (None, PRECISION):
+        raise mistake("precision", f"{PRECISION}, for which this process has kernels", repr(precision))
 
 
 def _solver_config(options: argparse.Namespace) -> SolverConfig:
@@ -142,6 +222,8 @@ def _run(options: argparse.Namespace) -> None:
         InputError: scene, parameters, settings, device or output directory do not work.
         SimulationError: the run cannot go on.
     """
+    _choose_precision(options.precision)
+
     from rich.console import Console
 
     from warp_mpm.output.progress_bar import progress_on
@@ -151,7 +233,7 @@ def _run(options: argparse.Namespace) -> None:
     from warp_mpm.warp_startup import start_quietly
 
     config = _solver_config(options)
-    save = Save(frames=options.frames)
+    save = _save(options)
     start_quietly()
     scene = load_scene_from_text(options.scene, options.set)
     progress = progress_on(Console())
@@ -226,6 +308,31 @@ def _export(options: argparse.Namespace) -> None:
     print(export(options.path, options.to, options.frame))
 
 
+def _figures(options: argparse.Namespace) -> None:
+    """Draw the pictures of a run, and print which.
+
+    Raises:
+        InputError: no run directory, an unknown picture, or a program that drawing needs is missing.
+    """
+    from warp_mpm.run_directory import FIGURES, load
+
+    try:
+        from warp_mpm.output.figures import draw_figures, render
+    except ImportError as error:
+        raise mistake("figures", "matplotlib", "none", "pip install matplotlib") from error
+    run = load(options.directory)
+    wants_pyvista = render.is_installed() and "field" in (options.names or ["field"])
+    fault = render.fault() if wants_pyvista else None
+    if fault is not None:
+        print(f"PyVista cannot draw here ({fault}): matplotlib draws the surfaces, coarser")
+    smooth = wants_pyvista and fault is None
+    target = options.output if options.output is not None else options.directory / FIGURES
+    drawn, missing = draw_figures(run, target, options.names, options.animate, smooth)
+    for name, reason in missing.items():
+        print(f"{name}: not drawn, {reason}")
+    print(f"{', '.join(drawn) or 'nothing'} in {target}")
+
+
 def _verify(options: argparse.Namespace) -> None:
     """Solve problems with exact answers and judge the solver.
 
@@ -233,6 +340,8 @@ def _verify(options: argparse.Namespace) -> None:
         InputError: unknown problem, wrong settings, device or output directory.
         VerificationError: a bound is broken, or a run could not go on.
     """
+    _choose_precision(options.precision)
+
     from warp_mpm.verification.command import print_problems, verify
     from warp_mpm.verification.problems import all_problems
     from warp_mpm.verification.session import Setup

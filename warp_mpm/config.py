@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from warp_mpm.checks import count, instance, positive
 from warp_mpm.errors import InputError
 
 
@@ -74,6 +75,18 @@ class SolverConfig:
             )
 
 
+class Layout(Enum):
+    """How the USD file lies on the disk when the run is over.
+
+    AUTO: one file if it is below about 1 GB, else clips. SINGLE: one file. CLIPS: one file a frame, and one that plays
+    them.
+    """
+
+    AUTO = "auto"
+    SINGLE = "single"
+    CLIPS = "clips"
+
+
 @dataclass(frozen=True)
 class Save:
     """When and what to save."""
@@ -81,15 +94,23 @@ class Save:
     frames: int = 60  # including the first and the last
     fields: tuple[str, ...] = ()  # further particle fields in the USD file, from `PARTICLE_FIELDS`
     figures: bool = True  # draw the pictures at the end
+    layout: Layout = Layout.AUTO  # of the USD file
+    particles_every: int = 1  # the USD file has one particle in so many, in creation order
+    isosurface: float | None = None  # also show where the field pressure has this value [Pa]
+    usdz: bool = False  # also pack the USD file into a .usdz
 
     def __post_init__(self) -> None:
         """Check the values.
 
         Raises:
-            InputError: fewer than two frames, or an unknown field.
+            InputError: a value is out of range, or a field is unknown.
         """
         if self.frames < 2:
             raise InputError(f"save: frames: expected at least 2, the first and the last, got {self.frames}")
+        instance("save: layout", self.layout, Layout, "a Layout, such as Layout.CLIPS")
+        count("save: particles_every", self.particles_every)
+        if self.isosurface is not None:
+            positive("save: isosurface", self.isosurface)
         for name in self.fields:
             if name not in PARTICLE_FIELDS:
                 raise InputError(f"save: fields: expected any of {', '.join(PARTICLE_FIELDS)}, got {name!r}")

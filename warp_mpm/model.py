@@ -12,6 +12,7 @@ from warp_mpm.kernels import shape, strain, walls
 from warp_mpm.kernels.arrival import Ignition
 from warp_mpm.kernels.motion import Faces
 from warp_mpm.kernels.order import Slabs
+from warp_mpm.kernels.precision import vector3
 from warp_mpm.kernels.viscosity import Viscosity
 from warp_mpm.materials import Material
 from warp_mpm.scene import Charge, Scene, Wall
@@ -168,10 +169,10 @@ def _charge_model(scene: Scene, charge: Charge, burn_width: float) -> ChargeMode
 
 def _ignition(scene: Scene, detonator: PointDetonator | PlaneDetonator, spacing: float) -> Ignition:
     ignition = Ignition()
-    ignition.position = wp.vec3(*np.subtract(detonator.position, scene.domain.lower))
+    ignition.position = vector3(*np.subtract(detonator.position, scene.domain.lower))
     ignition.time = detonator.time
     if isinstance(detonator, PlaneDetonator):
-        ignition.normal = wp.vec3(*(np.array(detonator.normal) / np.linalg.norm(detonator.normal)))
+        ignition.normal = vector3(*(np.array(detonator.normal) / np.linalg.norm(detonator.normal)))
     elif detonator.booster:
         ignition.booster_radius = spacing
     return ignition
@@ -181,7 +182,7 @@ def _boundary(scene: Scene) -> walls.Boundary:
     boundary = walls.Boundary()
     for face, wall in enumerate(scene.walls.faces()):
         boundary.wall[face] = int(WALL_CODES[wall])
-    boundary.gravity = wp.vec3(*scene.gravity)
+    boundary.gravity = vector3(*scene.gravity)
     return boundary
 
 
@@ -197,5 +198,5 @@ def _viscosity(scene: Scene, config: SolverConfig) -> Viscosity:
     viscosity.quadratic, viscosity.linear = config.viscosity
     viscosity.length = scene.domain.cell_volume ** (1 / 3)
     viscosity.inverse_length = 1.0 / viscosity.length
-    viscosity.inverse_spacing = wp.vec3(*(1.0 / size for size in scene.domain.spacing))
+    viscosity.inverse_spacing = vector3(*(1.0 / size for size in scene.domain.spacing))
     return viscosity

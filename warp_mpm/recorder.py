@@ -1,10 +1,8 @@
-"""The record of every step: peaks, the pressure around front path and collision points and along the line, gauges.
+"""The record of every step: peaks, the pressure around front path and collision points and along the line, gauges, and
+what is worth keeping of the section plane.
 
 It is kept on the device and fetched in chunks, so that no step waits for the host.
 """
-
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 import warp as wp
@@ -27,28 +25,15 @@ from warp_mpm.kernels.record import (
     RECORD_PARTICLE_PRESSURE,
     record_step,
 )
-from warp_mpm.output.frame import GaugeRecord, LineRecord
+from warp_mpm.output.frame import GaugeRecord, LineRecord, StepRecord
 from warp_mpm.scene import Domain, Scene, Segment, Vector
-from warp_mpm.state import State
+from warp_mpm.section import SectionRecorder
+from warp_mpm.state import NUMBER, State
+from warp_mpm.summary import arrival_threshold
 
 CHUNK = 512  # steps between two fetches
 PATH_REACH = 1.0  # cells around the front path in which its pressure is taken
 POINT_REACH = 2.0  # cells around a collision point
-
-
-@dataclass(frozen=True)
-class StepRecord:
-    """What was recorded, one row a step, the initial state first. Pressures in Pa, times in s."""
-
-    time: np.ndarray  # (steps,) float64
-    dt: np.ndarray  # (steps,)
-    particle_pressure: np.ndarray  # (steps,) highest of all particles
-    field_pressure: np.ndarray  # (steps,) highest of all nodes at least half filled
-    path_pressure: np.ndarray | None  # (steps,) highest within a cell of the front path
-    point_pressures: np.ndarray  # (steps, points) highest within two cells of each collision point
-    path: LineRecord | None  # along the front path
-    line: LineRecord | None  # along the scene's line
-    gauges: Mapping[str, GaugeRecord] = field(default_factory=dict)  # by name
 
 
 class Recorder:
@@ -75,12 +60,13 @@ class Recorder:
             wp.array(flat.astype(np.int32), dtype=int, device=device),
             wp.array(begins.astype(np.int32), dtype=int, device=device),
             wp.array(_flat(scene.domain, cell).astype(np.int32), dtype=int, device=device),
-            wp.array(fraction.astype(np.float32), dtype=vector3, device=device),
+            wp.array(fraction, dtype=vector3, device=device),
         ]
         self._gauges = len(scene.gauges)
         self._gauge_places = _gauge_places(scene, device)
         self._first_gauge = RECORD_HEAD + self._regions + self._points
         lanes = self._first_gauge + GAUGE_LANES * self._gauges
+        self._section = SectionRecorder(state, arrival_threshold(scene))
         self._times = wp.zeros(CHUNK, dtype=wp.float64, device=device)
         self._rows = wp.zeros((CHUNK, lanes), dtype=scalar, device=device)
         self._fetched: list[tuple[np.ndarray, np.ndarray]] = []
@@ -98,6 +84,7 @@ class Recorder:
         wp.launch(record_step, 1 + self._regions + self._points, inputs=inputs, device=self._state.device)
         if self._gauges:
             self._record_gauges()
+        self._section.record()
         self._pending += 1
 
     def take_peak(self) -> float:
@@ -111,13 +98,13 @@ class Recorder:
         """What the gauges showed since this was last asked.
 
         Returns:
-            Times (steps,) float64 [s], and (steps, gauges, 8) float32: pressure [Pa], velocity [m/s], density [kg/m3],
+            Times (steps,) float64 [s], and (steps, gauges, 8): pressure [Pa], velocity [m/s], density [kg/m3],
             position [m].
         """
         self._fetch()
         fetched = self._fetched[self._gauges_taken :]
         self._gauges_taken = len(self._fetched)
-        rows = np.concatenate([np.empty((0, self._rows.shape[1]), np.float32), *(rows for _, rows in fetched)])
+        rows = np.concatenate([np.empty((0, self._rows.shape[1]), NUMBER), *(rows for _, rows in fetched)])
         return np.concatenate([np.empty(0), *(time for time, _ in fetched)]), self._gauge_lanes(rows)
 
     def result(self) -> StepRecord:
@@ -142,6 +129,7 @@ class Recorder:
             gauges={
                 gauge.name: _gauge_record(time, on_gauges[:, number]) for number, gauge in enumerate(self._scene.gauges)
             },
+            section=self._section.result(),
         )
 
     def _record_gauges(self) -> None:
@@ -220,7 +208,7 @@ def _gauge_places(scene: Scene, device: wp.Device) -> GaugePlaces:
     cell, fraction = _cells_of(scene.domain, points)
     places = GaugePlaces()
     places.cell = wp.array(cell.astype(np.int32), dtype=wp.vec3i, device=device)
-    places.fraction = wp.array(fraction.astype(np.float32), dtype=vector3, device=device)
+    places.fraction = wp.array(fraction, dtype=vector3, device=device)
     places.particle = wp.zeros(len(points), dtype=int, device=device)
     places.lower = wp.vec3d(*scene.domain.lower)
     places.spacing = wp.vec3d(*scene.domain.spacing)

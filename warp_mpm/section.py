@@ -1,21 +1,63 @@
-"""The field pressure on the scene's section plane."""
+"""The field pressure on the scene's section plane: now, and what of its past is worth keeping."""
 
 import numpy as np
+import warp as wp
 
-from warp_mpm.state import State
+from warp_mpm.kernels.precision import NEVER, scalar
+from warp_mpm.kernels.record import record_section
+from warp_mpm.output.frame import SectionRecord
+from warp_mpm.scene import Scene
+from warp_mpm.state import NUMBER, State
 
 
 def section_pressure(state: State) -> np.ndarray:
-    """Field pressure (nodes_u, nodes_v) float32 [Pa] at the nodes of the section plane.
+    """Field pressure (nodes_u, nodes_v) [Pa] at the nodes of the section plane.
 
     Between two layers of nodes it is interpolated linearly.
     """
-    scene = state.model.scene
-    domain, plane = scene.domain, scene.section
     pressure = state.field_pressure()
+    axis = state.model.scene.section.axis
+    below, share = _layer(state.model.scene)
+    low = np.take(pressure, below, axis=axis)
+    high = np.take(pressure, below + 1, axis=axis)
+    return (1 - share) * low + share * high
+
+
+class SectionRecorder:
+    """Keeps the highest pressure and the arrival of a front at every node of the section plane, on the device."""
+
+    def __init__(self, state: State, threshold: float | None) -> None:
+        """Begin before the first step; the front has arrived where the pressure has reached a threshold [Pa].
+
+        Without a threshold nothing ever arrives.
+        """
+        scene, grid = state.model.scene, state.grid
+        below, share = _layer(scene)
+        strides = (int(grid.stride_x), int(grid.stride_y), 1)
+        first, second = scene.section.in_plane
+        corner = sum(strides) + below * strides[scene.section.axis]  # the ghosts come before the domain's first node
+        shape = (scene.domain.cells[first] + 1, scene.domain.cells[second] + 1)
+        last = wp.zeros(shape, dtype=scalar, device=state.device)
+        self._peak = wp.zeros(shape, dtype=scalar, device=state.device)
+        self._arrival = wp.full(shape, NEVER, dtype=scalar, device=state.device)
+        plane = [corner, strides[first], strides[second], strides[scene.section.axis], share]
+        limit = np.inf if threshold is None else threshold
+        inputs = [grid, state.clock, *plane, limit, last, self._peak, self._arrival]
+        self._launch = wp.launch(record_section, shape, inputs=inputs, device=state.device, record_cmd=True)
+
+    def record(self) -> None:
+        """Take the state as it is now into account: once before the first step, then after each."""
+        self._launch.launch()
+
+    def result(self) -> SectionRecord:
+        """What was kept so far."""
+        arrival = self._arrival.numpy()
+        return SectionRecord(self._peak.numpy().copy(), np.where(arrival < NEVER, arrival, NUMBER.type(np.nan)))
+
+
+def _layer(scene: Scene) -> tuple[int, np.floating]:
+    """The layer of nodes below the section plane, and how much of a cell above it the plane is."""
+    domain, plane = scene.domain, scene.section
     place = (plane.coordinate - domain.lower[plane.axis]) / domain.spacing[plane.axis]
     below = int(np.clip(np.floor(place), 0, domain.cells[plane.axis] - 1))
-    share = np.float32(place - below)
-    low = np.take(pressure, below, axis=plane.axis)
-    high = np.take(pressure, below + 1, axis=plane.axis)
-    return (1 - share) * low + share * high
+    return below, NUMBER.type(place - below)

@@ -15,12 +15,16 @@ from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, totals_of
 from warp_mpm.errors import SimulationError
 from warp_mpm.guards import check_faults, check_memory, writable_directory
+from warp_mpm.isosurface import pressure_isosurface
+from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.model import Model, build_model
-from warp_mpm.output.frame import Frame, SectionPicture
+from warp_mpm.output.description import scene_values
+from warp_mpm.output.frame import Frame, SectionPicture, StepRecord
 from warp_mpm.progress import Progress, Silent
-from warp_mpm.recorder import Recorder, StepRecord
-from warp_mpm.scene import Charge, Scene, Wall
+from warp_mpm.recorder import Recorder
+from warp_mpm.run_directory import FIGURES, STEPS, SUMMARY, load
+from warp_mpm.scene import Scene, Wall
 from warp_mpm.section import section_pressure
 from warp_mpm.solver import Solver
 from warp_mpm.state import State
@@ -104,7 +108,8 @@ class _Run:
         check_memory(self.model)
         progress.message(
             f"{scene.name}: {scene.particle_count:,} particles in {math.prod(scene.domain.cells):,} cells on "
-            f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}; preparing kernels"
+            f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}, in {PRECISION} precision; "
+            "preparing kernels"
         )
         self.state = State(self.model)
         self.solver = Solver(self.model, self.state, self.launcher)
@@ -124,6 +129,7 @@ class _Run:
         self.recorder.record()
         with self._writers() as write:
             next_frame = self._save_due(write, frames, 0, pictures, 0.0)
+            self._write_start()
             now = 0.0
             while now < end:
                 now = self._advance(min([frames[next_frame], *pictures[:1]]))
@@ -136,14 +142,16 @@ class _Run:
         record = self.recorder.result()
         summary = {"status": status, **self._summary(record, time.perf_counter() - begin)}
         if self.output is not None:
+            from warp_mpm.output.steps import write_steps
             from warp_mpm.output.tables import write_summary
 
-            write_summary(self.output / "summary.json", summary)
+            write_summary(self.output / SUMMARY, summary)
+            write_steps(self.output / STEPS, record, self.pictures)
             if self.save.figures:
                 self.progress.message("drawing figures")
-                self._draw(record, summary)
+                summary["warnings"] += self._draw()
             summary["wall_s"] = time.perf_counter() - begin
-            write_summary(self.output / "summary.json", summary)
+            write_summary(self.output / SUMMARY, summary)
         return Result(summary, self.history, record, tuple(self.pictures), self.state, self.output)
 
     def _advance(self, instant: float) -> float:
@@ -218,18 +226,22 @@ class _Run:
                     pressure_range=(0.0, color_limit(self.scene)),
                     frames=self.save.frames,
                     fields=self.save.fields,
+                    particles_every=self.save.particles_every,
+                    isosurface=self.save.isosurface,
+                    layout=self.save.layout,
+                    usdz=self.save.usdz,
                 )
             )
             write_gauges = self._gauge_writer(self.output / "gauges.csv", stack)
             history: list[TableWriter] = []
 
             def write(index: int, now: float, pressure: np.ndarray, inside: np.ndarray, row: dict[str, float]) -> None:
+                usd.write(self._frame(index, now, pressure, inside))  # before its row: what has a row can be shown
                 if not history:
                     path = self.output / "history.csv" if self.output else Path()
                     history.append(stack.enter_context(TableWriter(path, list(row))))
                 history[0].write(row)
                 write_gauges()
-                usd.write(self._frame(index, now, pressure, inside))
 
             yield write
 
@@ -252,37 +264,45 @@ class _Run:
     def _frame(self, index: int, now: float, pressure: np.ndarray, inside: np.ndarray) -> Frame:
         sources = {"particleVelocity": "velocity"}
         values = {name: self.state.field(sources.get(name, name)) for name in self.save.fields}
-        return Frame(index, now, self.state.positions(), pressure, inside, section_pressure(self.state), values)
+        section = section_pressure(self.state)
+        level = self.save.isosurface
+        surface = None if level is None else pressure_isosurface(self.state, level)
+        return Frame(index, now, self.state.positions(), pressure, inside, section, values, surface)
 
-    def _draw(self, record: StepRecord, summary: dict[str, Any]) -> None:
-        """Draw the pictures; without matplotlib say so and go on."""
+    def _write_start(self) -> None:
+        """Say what is run before it is run: a run that is killed leaves frames, and what they show."""
+        if self.output is not None:
+            from warp_mpm.output.tables import write_summary
+
+            (self.output / STEPS).unlink(missing_ok=True)  # of an earlier run
+            write_summary(self.output / SUMMARY, {"status": "running", **self._given()})
+
+    def _draw(self) -> list[str]:
+        """Draw the pictures from what is now in the run directory, as the command does; returns what to warn of."""
         assert self.output is not None
         try:
             from warp_mpm.output import figures
         except ImportError:
-            summary["warnings"].append("figures: not drawn, matplotlib is missing; pip install matplotlib")
-            return
-        directory = self.output / "figures"
-        directory.mkdir(exist_ok=True)
-        if self.pictures:
-            figures.section_figure(directory / "section.png", self.scene, self.pictures)
-        if record.line is not None:
-            figures.front_figure(directory / "front.png", self.scene, record.line)
-        figures.energy_figure(directory / "energy.png", self.history)
+            return ["figures: not drawn, matplotlib is missing; pip install matplotlib"]
+        figures.draw_figures(load(self.output), self.output / FIGURES)
+        return []
+
+    def _given(self) -> dict[str, Any]:
+        """The keys of summary.json that are known before the first step."""
+        return {
+            **scene_values(self.scene),
+            "solver": _solver_values(self.model),
+            "version": VERSION,
+            "device": self.launcher.device.name,
+            "threads": self.launcher.threads,
+            "precision": PRECISION,
+        }
 
     def _summary(self, record: StepRecord, wall: float) -> dict[str, Any]:
         clock = self.state.clock_values()
         final = self.history[-1]
         return {
-            "scene": self.scene.name,
-            "parameters": dict(self.scene.parameters),
-            "solver": _solver_values(self.model),
-            "version": VERSION,
-            "device": self.launcher.device.name,
-            "threads": self.launcher.threads,
-            "particles": self.scene.particle_count,
-            "cells": list(self.scene.domain.cells),
-            "charges": [_charge_values(charge) for charge in self.scene.charges],
+            **self._given(),
             "steps": self.steps,
             "end_time_s": float(clock["time"]),
             "wall_s": wall,
@@ -325,19 +345,6 @@ def color_limit(scene: Scene) -> float:
     if material is not None and material.cj is not None:
         return 1.6 * material.cj.pressure
     return max(c.material.density * (c.material.specific_energy + 0.5 * c.greatest_speed**2) for c in scene.charges)
-
-
-def _charge_values(charge: Charge) -> dict[str, Any]:
-    """What the summary says of a charge: how exactly its volume is known above all."""
-    return {
-        "name": charge.name,
-        "material": charge.material.name,
-        "particles": len(charge.positions),
-        "mass_kg": charge.mass,
-        "volume_m3": charge.volume,
-        "volume_tolerance": charge.volume_tolerance,
-        "specific_energy_J_kg": charge.material.specific_energy,
-    }
 
 
 def _solver_values(model: Model) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from warp_mpm.kernels import material, motion, reduce, sharpen, transfer
 from warp_mpm.kernels.blocks import NODES
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
 from warp_mpm.kernels.node_pass import Phase
+from warp_mpm.kernels.precision import vector3
 from warp_mpm.launch import Launcher, Task
 from warp_mpm.model import LARGEST_DRIFT, STRAINS, ChargeModel, Model
 from warp_mpm.state import State
@@ -163,7 +164,7 @@ class Solver:
         state, model = self.state, self.model
         slabs = model.slab_count
         damping = reduce.DAMPING if model.damped else 0.0
-        inputs = [state.clock, wp.vec3(*model.spacing), model.viscosity.length, model.config.cfl, damping]
+        inputs = [state.clock, vector3(*model.spacing), model.viscosity.length, model.config.cfl, damping]
         self._start_step = self.launcher.record(reduce.start_step, 1, [*inputs, slabs, state.maxima])
         self._end_step = self.launcher.record(reduce.end_step, 1, [state.clock, slabs, state.maxima])
         self._collect_reactions = self.launcher.record(

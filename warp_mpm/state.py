@@ -7,7 +7,7 @@ import warp as wp
 
 from warp_mpm.kernels import arrival, grid, order
 from warp_mpm.kernels.blocks import EDGE, NODES
-from warp_mpm.kernels.precision import NEVER, matrix3, scalar, vector2, vector3, vector4, vector8
+from warp_mpm.kernels.precision import LAST_FRACTION, NEVER, matrix3, scalar, vector2, vector3, vector4, vector8
 from warp_mpm.kernels.records import (
     TALLIES,
     BurnTimes,
@@ -27,7 +27,7 @@ CACHE_LINE = 64  # [bytes]; a node's eight lanes never lie in two
 NO_STEP = -2  # a stamp that no step has
 LIGHT = 1e-14  # of a particle's mass: nodes with less count as empty
 CHUNK = 100_000  # particles placed at a time
-LAST_FRACTION = np.float32(0.99999994)  # the largest number below one in single precision
+NUMBER = np.dtype(wp.dtype_to_numpy(scalar))  # the scalar type, for NumPy
 
 PARTICLE_ARRAYS = (
     "position",
@@ -118,10 +118,10 @@ class State:
         self.clock.assign(values)
 
     def positions(self) -> np.ndarray:
-        """Positions of all particles (n, 3) float32 [m], in creation order."""
+        """Positions of all particles (n, 3) [m], in creation order."""
         cell = self.values("cell").astype(np.float64)
         place = (cell + self.values("fraction")) * self.model.spacing + self.model.scene.domain.lower
-        return self.in_creation_order(place.astype(np.float32))
+        return self.in_creation_order(place.astype(NUMBER))
 
     def in_creation_order(self, values: np.ndarray) -> np.ndarray:
         """Reorder per-particle values from memory order to creation order."""
@@ -195,8 +195,9 @@ class State:
 def memory_needed(model: Model) -> int:
     """Bytes that a state of this model takes on its device."""
     records = sum(record.numpy_dtype()["itemsize"] for record in RECORDS.values())
-    particle = records + 4 + (36 if model.affine else 0) + 26  # its index; the keys and the scratch of the sort
-    node = 8 * 4 + 2 * 4 + 2 * 4 + 4 * 4 + (8 * 4 if model.sharpened else 0)
+    affine = 9 * NUMBER.itemsize if model.affine else 0
+    particle = records + affine + 4 + 26  # its index; the keys and the scratch of the sort
+    node = (8 + 2 + 2 + 4 + (8 if model.sharpened else 0)) * NUMBER.itemsize
     nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
     return int(model.scene.particle_count * particle + nodes * node)
 
@@ -229,11 +230,10 @@ def _sparse_zeros(count: int, dtype: Any, device: wp.Device) -> wp.array:
     if device.is_cuda or count == 0:
         return wp.zeros(count, dtype=dtype, device=device)
     lanes = getattr(dtype, "_length_", 1)
-    kind = np.dtype(wp.dtype_to_numpy(scalar))
-    size = count * lanes * kind.itemsize
+    size = count * lanes * NUMBER.itemsize
     raw = np.zeros(size + CACHE_LINE, dtype=np.uint8)
     begin = -raw.ctypes.data % CACHE_LINE
-    values = raw[begin : begin + size].view(kind)
+    values = raw[begin : begin + size].view(NUMBER)
     return wp.array(values.reshape(count, lanes) if lanes > 1 else values, dtype=dtype, device=device, copy=False)
 
 
@@ -274,7 +274,7 @@ def _fill_places(records: np.ndarray, positions: np.ndarray, model: Model) -> No
         place = (positions[chunk] - model.scene.domain.lower) / model.spacing
         cell = np.clip(np.floor(place), 0, last)
         records["cell"][chunk] = cell
-        records["fraction"][chunk] = np.clip((place - cell).astype(np.float32), 0.0, LAST_FRACTION)
+        records["fraction"][chunk] = np.clip((place - cell).astype(NUMBER), 0.0, float(LAST_FRACTION))
 
 
 def _records(record: Any, count: int) -> np.ndarray:

@@ -7,8 +7,7 @@ import numpy as np
 from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.exact.reflection import collision_pressure
 from warp_mpm.materials import Material
-from warp_mpm.output.frame import LineRecord
-from warp_mpm.recorder import StepRecord
+from warp_mpm.output.frame import LineRecord, StepRecord
 from warp_mpm.scene import Scene
 
 ARRIVAL_SHARE = 0.05  # of p_CJ: the front has arrived at a point when the field pressure there reaches it
@@ -42,6 +41,12 @@ def lit_explosive(scene: Scene) -> Material | None:
             if name in explosives:
                 return explosives[name]
     return next(iter(explosives.values()), None)
+
+
+def arrival_threshold(scene: Scene) -> float | None:
+    """Field pressure at which the front counts as arrived [Pa]; None without an explosive that has a CJ state."""
+    material = lit_explosive(scene)
+    return None if material is None or material.cj is None else ARRIVAL_SHARE * material.cj.pressure
 
 
 def ideal_arrival(scene: Scene, points: np.ndarray, speed: float) -> np.ndarray:
@@ -178,15 +183,22 @@ def gauge_figures(record: StepRecord, material: Material | None) -> dict[str, di
     return figures
 
 
+def theory(scene: Scene) -> dict[str, float | None]:
+    """What Chapman-Jouguet theory says of the explosive that the scene is about; None without one."""
+    material = lit_explosive(scene)
+    return {
+        "p_cj_pa": material.cj.pressure if material is not None and material.cj is not None else None,
+        "detonation_speed_m_s": material.burn.detonation_speed if material is not None and material.burn else None,
+    }
+
+
 def figures_of_merit(scene: Scene, record: StepRecord) -> dict[str, object]:
     """The keys of summary.json that compare the run with theory; None where they do not apply."""
     material = lit_explosive(scene)
-    state = material.cj if material is not None else None
     fit = front_speed(scene, record, material) if material is not None else None
     collisions = [float(value) for value in record.point_pressures.max(axis=0)]
     return {
-        "p_cj_pa": state.pressure if state else None,
-        "detonation_speed_m_s": material.burn.detonation_speed if material and material.burn else None,
+        **theory(scene),
         "front_pressure_pa": front_pressure(scene, record, material) if material is not None else None,
         "front_gauge_pressure_pa": gauge_pressure(scene, record, material) if material is not None else None,
         "front_speed_m_s": fit.speed if fit else None,

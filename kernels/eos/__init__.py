@@ -17,6 +17,8 @@ from typing import Any, Protocol
 
 import warp as wp
 
+from warp_mpm.kernels.precision import scalar
+
 
 class EquationOfState(Protocol):
     """What a material asks of its equation of state."""
@@ -29,3 +31,18 @@ class EquationOfState(Protocol):
 
     def record(self) -> Any:
         """The device record of this equation of state."""
+
+
+def evaluate(eos: EquationOfState, function: wp.Function, *numbers: float) -> float:
+    """A device function of an equation of state on the host, of density [kg/m3] and perhaps energy [J/kg].
+
+    Called from Python, Warp takes a plain number for a single-precision one and mixes it with no double: there every
+    number needs its type, those in the record too.
+    """
+    record = eos.record()
+    if scalar is wp.float64:
+        for name, variable in eos.Record.vars.items():
+            if variable.type is scalar:
+                setattr(record, name, scalar(getattr(record, name)))
+        return float(function(record, *map(scalar, numbers)))
+    return float(function(record, *map(float, numbers)))

@@ -23,6 +23,7 @@ Lawrence Radiation Laboratory 1968.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import warp as wp
 
@@ -116,7 +117,7 @@ class JWL:
         record.a, record.b = self.a, self.b
         record.r1, record.r2 = self.r1, self.r2
         record.omega = self.omega
-        record.least_volume = self._least_volume()
+        record.least_volume = self._least_volume
         return record
 
     def _offset_slope(self, volume: float) -> float:
@@ -124,6 +125,7 @@ class JWL:
         terms = ((self.a, self.r1 * volume), (self.b, self.r2 * volume))
         return sum(factor * math.exp(-x) * (x - self.omega - self.omega / x) for factor, x in terms)
 
+    @cached_property
     def _least_volume(self) -> float:
         """V below 1 at which a(rho) has its maximum; 0 if it has none there."""
         high = 1.0

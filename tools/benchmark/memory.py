@@ -35,9 +35,9 @@ def memory_record(cells: int, device: str | None, threads: int | None) -> dict[s
     """
     launcher = Launcher(find_device(device), threads)
     early(WARM_UP_CELLS, launcher)
-    before = _forget_peak(launcher.device)
+    before = forget_peak(launcher.device)
     solver = early(cells, launcher)
-    peak = _peak(launcher.device)
+    peak = highest(launcher.device)
     launcher.close()
     state, count = solver.state, solver.state.count
     growth = None if peak is None or before is None else (peak - before) / count
@@ -57,7 +57,7 @@ def array_bytes(holder: Any) -> int:
     return sum(arrays.values())
 
 
-def _forget_peak(device: wp.Device) -> int | None:
+def forget_peak(device: wp.Device) -> int | None:
     """Bytes in use now, from which on the peak counts."""
     if device.is_cuda:
         return wp.get_mempool_used_mem_current(device) if device.is_mempool_supported else None
@@ -69,7 +69,7 @@ def _forget_peak(device: wp.Device) -> int | None:
     return _status_bytes("VmRSS")
 
 
-def _peak(device: wp.Device) -> int | None:
+def highest(device: wp.Device) -> int | None:
     """Most bytes in use so far."""
     if device.is_cuda:
         return wp.get_mempool_used_mem_high(device) if device.is_mempool_supported else None

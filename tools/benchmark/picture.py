@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from benchmark.runs import SORT
-from warp_mpm.output.figures import STYLE
+from warp_mpm.output.figures.style import STYLE
 from warp_mpm.output.whole_file import whole_file
 
 Record = Mapping[str, Any]

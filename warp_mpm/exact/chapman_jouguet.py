@@ -15,7 +15,7 @@ Reference: W. Fickett, W. C. Davis, Detonation: Theory and Experiment, Dover 200
 import math
 from dataclasses import dataclass
 
-from warp_mpm.kernels.eos import EquationOfState
+from warp_mpm.kernels.eos import EquationOfState, evaluate
 
 HIGHEST_COMPRESSION = 20.0  # rho / rho0 up to which the state is searched
 SEARCH_STEP = 1.01  # growth of rho in the search
@@ -37,8 +37,7 @@ class ChapmanJouguetState:
 
 def _linear(eos: EquationOfState, density: float) -> tuple[float, float]:
     """The a [Pa] and b [kg/m3] of p = a + b e at a density [kg/m3]."""
-    record, at = eos.record(), float(density)  # device functions take no whole numbers
-    return float(eos.pressure_offset(record, at)), float(eos.pressure_slope(record, at))
+    return evaluate(eos, eos.pressure_offset, density), evaluate(eos, eos.pressure_slope, density)
 
 
 def pressure_of(eos: EquationOfState, density: float, energy: float) -> float:
@@ -72,7 +71,6 @@ def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: 
     Raises:
         ValueError: the equation of state has no such state up to a compression of 20.
     """
-    record = eos.record()
     initial_volume = 1.0 / initial_density
 
     def excess(density: float) -> float:
@@ -82,7 +80,7 @@ def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: 
             return math.inf
         compression = initial_volume - 1.0 / density
         internal = energy + 0.5 * pressure * compression
-        return density**2 * float(eos.sound_speed_squared(record, density, internal)) * compression - pressure
+        return density**2 * evaluate(eos, eos.sound_speed_squared, density, internal) * compression - pressure
 
     low = initial_density * SEARCH_STEP
     high = low

@@ -27,7 +27,7 @@ import numpy as np
 from warp_mpm.exact.chapman_jouguet import hugoniot_pressure, pressure_of
 from warp_mpm.exact.isentrope import Isentrope, isentrope
 from warp_mpm.exact.similar_flow import SimilarFlow
-from warp_mpm.kernels.eos import EquationOfState
+from warp_mpm.kernels.eos import EquationOfState, evaluate
 
 BISECTIONS = 40  # 1e-12 of the first interval
 DENSITY_STEP = 1.05  # factor, in the search for a shock's density
@@ -52,7 +52,7 @@ class MatterState:
     @cached_property
     def sound_speed(self) -> float:
         """Speed of sound [m/s]."""
-        return math.sqrt(float(self.eos.sound_speed_squared(self.eos.record(), float(self.density), self.energy)))
+        return math.sqrt(evaluate(self.eos, self.eos.sound_speed_squared, self.density, self.energy))
 
     @cached_property
     def isentrope(self) -> Isentrope:

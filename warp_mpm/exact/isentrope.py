@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warp_mpm.exact.chapman_jouguet import pressure_of
 from warp_mpm.exact.integration import hermite, runge_kutta
-from warp_mpm.kernels.eos import EquationOfState
+from warp_mpm.kernels.eos import EquationOfState, evaluate
 
 STEPS = 160
 REFINEMENT = 12  # of the table, by cubics: between its points straight lines are good to 1e-6
@@ -47,13 +48,11 @@ def isentrope(eos: EquationOfState, density: float, energy: float, last_density:
 
     It ends earlier where matter has no pressure or no sound speed left.
     """
-    record = eos.record()
 
     def state(log_density: float, internal: float) -> tuple[float, float]:
         """Pressure [Pa] and sound speed [m/s]."""
         at = math.exp(log_density)
-        pressure = float(eos.pressure_offset(record, at)) + float(eos.pressure_slope(record, at)) * internal
-        return pressure, math.sqrt(max(float(eos.sound_speed_squared(record, at, internal)), 0.0))
+        return pressure_of(eos, at, internal), math.sqrt(max(evaluate(eos, eos.sound_speed_squared, at, internal), 0.0))
 
     def slope(log_density: float, unknowns: np.ndarray) -> np.ndarray:
         pressure, sound = state(log_density, float(unknowns[0]))

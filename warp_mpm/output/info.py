@@ -15,10 +15,12 @@ from rich.console import Console
 
 from warp_mpm.errors import InputError
 from warp_mpm.output.tables import GAUGE_COLUMNS, print_summary
-from warp_mpm.output.usd_reading import frame_times, open_stage, usd_file, usd_files
+from warp_mpm.output.usd_reading import frame_times, open_stage, usd_file
+from warp_mpm.run_directory import usd_files
 
 MICROSECOND = 1e-6  # [s]
 COMPLETE = "complete"  # status of a run that came to its end
+RUNNING = "running"  # of one that goes on, and for ever of one that was killed
 GAUGE_MARK = f"_{GAUGE_COLUMNS[0]}"  # ends one column of every gauge
 WIDTH = 100  # of the text, in characters
 
@@ -60,9 +62,11 @@ def _summary_text(path: Path) -> str:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise InputError(f"info: {path}: expected JSON, got something else ({error}); run the scene again") from error
+    status = summary.get("status", COMPLETE)
+    if status == RUNNING:
+        return f"{summary.get('scene', path.parent)}: the run goes on, or was killed"
     text = io.StringIO()
     print_summary(summary, Console(file=text, width=WIDTH))
-    status = summary.get("status", COMPLETE)
     ended = "" if status == COMPLETE else f"\nthe run did not come to its end: {status}"
     return text.getvalue().rstrip() + ended
 

@@ -195,7 +195,8 @@ def _cost(summary: Mapping[str, Any]) -> str:
     wall, speed = summary.get("wall_s"), summary.get("ns_per_particle_step")
     seconds = DASH if wall is None else f"{wall:.1f} s"
     each = DASH if speed is None else f"{speed:.1f} ns"
-    return f"{size} in {seconds} on {summary.get('device') or DASH}, {each} per particle-step"
+    precision = f" in {summary['precision']} precision" if summary.get("precision") else ""
+    return f"{size} in {seconds} on {summary.get('device') or DASH}{precision}, {each} per particle-step"
 
 
 def _pressure(value: float | None) -> str:

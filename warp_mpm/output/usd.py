@@ -2,34 +2,30 @@
 
 While the run goes on, every frame is a file of its own in `clips/`, and a small root layer `<name>.usda` plays them in
 turn (USD value clips). A file appears under its name only when it is whole, so a killed run keeps every frame it wrote,
-and memory does not grow with their number. `close` merges the frames into one `<name>.usdc` if they are not too large.
+and memory does not grow with their number. `close` merges the frames into one `<name>.usdc`, unless it is too large or
+they are to stay apart, and packs the result into `<name>.usdz` if asked to.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import numpy as np
 from pxr import Gf, Sdf, Tf, Vt
 
-from warp_mpm.output import colormap
+from warp_mpm.config import Layout
 from warp_mpm.output.frame import Frame
-from warp_mpm.output.usd_layout import (
-    PARTICLES,
-    SECTION,
-    WORLD,
-    animated_attributes,
-    author_stage_metadata,
-    author_static,
-    particle_widths,
-    section_axes,
-)
+from warp_mpm.output.usd_frame import FrameSampler
+from warp_mpm.output.usd_layout import WORLD, Contents, author_stage_metadata, author_static
+from warp_mpm.output.usd_package import pack
 from warp_mpm.output.whole_file import whole_file, write_error
 from warp_mpm.scene import Scene
 
-MERGE_LIMIT = 1_000_000_000  # [bytes]; larger results stay in clips, because merging maps all frames at once
+MERGE_LIMIT = 1_000_000_000  # [bytes] of frames that Layout.AUTO merges
+MERGE_BATCH = 50_000_000  # [bytes] of frames that are in memory at once while merging
 STATIC = "static.usdc"  # in clips/: every prim, and every value that does not change
 MANIFEST = "manifest.usda"  # in clips/: which attributes the clips animate
 
@@ -45,6 +41,10 @@ class UsdWriter:
         pressure_range: tuple[float, float],
         frames: int,
         fields: Sequence[str] = (),
+        particles_every: int = 1,
+        isosurface: float | None = None,
+        layout: Layout = Layout.AUTO,
+        usdz: bool = False,
     ) -> None:
         """Write the parts that do not change, and remove what an earlier run left under the same names.
 
@@ -54,31 +54,35 @@ class UsdWriter:
             pressure_range: pressures shown in the first and the last colour [Pa].
             frames: number of frames that are planned, at least 2.
             fields: further particle fields, names from `PARTICLE_FIELDS`.
+            particles_every: one particle in so many is shown, in creation order.
+            isosurface: pressure of the surface to show [Pa]; frames need to have it.
+            layout: whether the frames become one file.
+            usdz: also pack the result into `<name>.usdz`.
 
         Raises:
             SimulationError: the file system refuses.
         """
         self._path = Path(path).with_suffix(".usdc")
         self._root = self._path.with_suffix(".usda")
+        self._package = self._path.with_suffix(".usdz")
         self._clips = self._path.parent / "clips"
-        self._scene = scene
-        self._fields = tuple(fields)
-        self._pressure_range = pressure_range
+        self._layout = layout
+        self._usdz = usdz
         self._microseconds_per_time_code = 1e6 * scene.end_time / max(frames - 1, 1)
-        self._types = animated_attributes(scene, self._fields)
-        self._widths = particle_widths(scene)
-        self._section_shape = tuple(len(axis) for axis in section_axes(scene))
+        self._contents = Contents(scene, pressure_range, tuple(fields), particles_every, isosurface)
+        self._sampler = FrameSampler(self._contents)
         self._indices: list[int] = []
-        self._static = Sdf.Layer.CreateAnonymous(".usdc")
-        author_static(self._static, scene, self._fields)
+        self._result: Path | None = None
+        self._static = _static(self._contents)
         try:
             self._remove_working_files()
-            self._path.unlink(missing_ok=True)
+            for old in (self._path, self._package):
+                old.unlink(missing_ok=True)
             self._clips.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise write_error(self._path, error) from error
         _export(self._static, self._clips / STATIC)
-        _export(_manifest(self._types), self._clips / MANIFEST)
+        _export(_manifest(self._sampler.types), self._clips / MANIFEST)
 
     def __enter__(self) -> "UsdWriter":
         """The writer itself."""
@@ -96,59 +100,34 @@ class UsdWriter:
             ValueError: an array does not have one entry per particle, or per node of the section.
         """
         clip = Sdf.Layer.CreateAnonymous(".usdc")
-        for path, value in self._samples(frame).items():
-            Sdf.JustCreatePrimAttributeInLayer(clip, path, self._types[path])
+        for path, value in self._sampler.samples(frame).items():
+            Sdf.JustCreatePrimAttributeInLayer(clip, path, self._sampler.types[path])
             clip.SetTimeSample(path, float(frame.index), value)
         _export(clip, self._clip(frame.index))
         self._indices.append(frame.index)
         _export(self._root_layer(), self._root)
 
     def close(self) -> Path:
-        """Merge the frames into one file if they are small enough; say where the result is. May be called twice.
+        """Merge the frames into one file if the layout says so; say where the result is. May be called twice.
 
         Raises:
             SimulationError: the disk is full or refuses. The frames stay readable through `<name>.usda`.
         """
-        if not self._clips.exists():
-            return self._path
+        if self._result is None:
+            try:
+                self._result = self._merge() if self._is_merged() else self._root
+            except OSError as error:
+                raise write_error(self._clips, error) from error
+            if self._usdz:
+                pack(self._package, self._files(self._result))
+        return self._result
+
+    def _is_merged(self) -> bool:
+        """Whether the frames become one file; without any there are no clips to play."""
+        if not self._indices or self._layout is Layout.SINGLE:
+            return True
         size = sum(self._clip(index).stat().st_size for index in self._indices)
-        if size > MERGE_LIMIT:
-            return self._root
-        self._merge()
-        try:
-            self._remove_working_files()
-        except OSError as error:
-            raise write_error(self._clips, error) from error
-        return self._path
-
-    def _samples(self, frame: Frame) -> dict[str, Any]:
-        """The value of every animated attribute in this frame, by path."""
-        count = self._scene.particle_count
-        position = _checked("position", frame.position, (count, 3))
-        inside = _checked("inside", frame.inside, (count,), np.bool_)
-        pressure = np.where(inside, _checked("pressure", frame.pressure, (count,)), np.float32(0.0))
-        section = _checked("section", frame.section, self._section_shape).ravel()
-        widths = np.where(inside, self._widths, np.float32(0.0))
-        samples = {
-            f"{WORLD}.blast:time": float(frame.time),
-            f"{PARTICLES}.points": Vt.Vec3fArray.FromNumpy(position),
-            f"{PARTICLES}.extent": _extent(position, widths),
-            f"{PARTICLES}.primvars:pressure": Vt.FloatArray.FromNumpy(pressure),
-            f"{PARTICLES}.primvars:displayColor:indices": self._color_indices(pressure),
-            f"{SECTION}.primvars:pressure": Vt.FloatArray.FromNumpy(section),
-            f"{SECTION}.primvars:displayColor:indices": self._color_indices(section),
-        }
-        if f"{PARTICLES}.widths" in self._types:
-            samples[f"{PARTICLES}.widths"] = Vt.FloatArray.FromNumpy(widths)
-        for name in self._fields:
-            is_vector = self._types[f"{PARTICLES}.primvars:{name}"] == Sdf.ValueTypeNames.Float3Array
-            values = _checked(name, frame.fields[name], (count, 3) if is_vector else (count,))
-            array_type = Vt.Vec3fArray if is_vector else Vt.FloatArray
-            samples[f"{PARTICLES}.primvars:{name}"] = array_type.FromNumpy(values)
-        return samples
-
-    def _color_indices(self, pressure: np.ndarray) -> Any:
-        return Vt.IntArray.FromNumpy(colormap.indices(pressure, *self._pressure_range))
+        return self._layout is Layout.AUTO and size <= MERGE_LIMIT
 
     def _root_layer(self) -> Any:
         """The layer that plays the clips written so far.
@@ -175,36 +154,70 @@ class UsdWriter:
         )
         return layer
 
-    def _merge(self) -> None:
-        """Write everything into one file, then give it its name."""
-        merged = Sdf.Layer.CreateAnonymous(".usdc")
-        merged.TransferContent(self._static)
-        self._author_metadata(merged)
-        # Samples are views of the mapped clip files, so these stay open until all is written.
-        open_clips = []
-        for index in self._indices:
-            clip = Sdf.Layer.FindOrOpen(str(self._clip(index)))
-            open_clips.append(clip)
-            for path in self._types:
-                merged.SetTimeSample(path, float(index), clip.QueryTimeSample(path, float(index)))
-        _export(merged, self._path)
-        del merged
+    def _merge(self) -> Path:
+        with whole_file(self._path) as part, _errors_of_usd():
+            self._write_merged(part)
+        self._remove_working_files()
+        return self._path
+
+    def _write_merged(self, part: Path) -> None:
+        """Write everything into one file, some frames at a time.
+
+        Samples are views of the mapped clip files. Once the layer is saved it has views of its own file instead, which
+        is mapped but not read, and the clips can be let go.
+        """
+        merged = Sdf.Layer.CreateNew(str(part))
+        try:
+            merged.TransferContent(self._static)
+            self._author_metadata(merged)
+            open_clips: list[Any] = []
+            size = 0
+            for index in self._indices:
+                clip = Sdf.Layer.OpenAsAnonymous(str(self._clip(index)))  # afresh, whoever still shows an earlier run
+                for path in self._sampler.types:
+                    merged.SetTimeSample(path, float(index), clip.QueryTimeSample(path, float(index)))
+                open_clips.append(clip)
+                size += self._clip(index).stat().st_size
+                if size >= MERGE_BATCH:
+                    merged.Save()
+                    open_clips.clear()
+                    size = 0
+            merged.Save()
+        finally:
+            del merged  # an error keeps the variables of this function, and USD allows one layer of a name
+
+    def _files(self, result: Path) -> list[Path]:
+        """The result and all that it needs."""
+        if result == self._path:
+            return [result]
+        return [result, self._clips / STATIC, self._clips / MANIFEST, *map(self._clip, self._indices)]
 
     def _author_metadata(self, layer: Any) -> None:
         frames = self._indices[-1] + 1 if self._indices else 0
-        author_stage_metadata(layer, self._scene, self._pressure_range, self._microseconds_per_time_code, frames)
+        author_stage_metadata(layer, self._contents, self._microseconds_per_time_code, frames)
 
     def _clip(self, index: int) -> Path:
         return self._clips / f"frame_{index:05d}.usdc"
 
     def _remove_working_files(self) -> None:
-        """Remove the root layer first: without it the clips are just files, without them it would be a broken stage."""
+        """Remove the root layer first: without it the clips are just files, without them it would be a broken stage.
+
+        A killed run leaves unfinished files too, `<name>.part.` and then a suffix or some letters that USD makes up.
+        """
         self._root.unlink(missing_ok=True)
-        if self._clips.is_dir():
-            for file in [*self._clips.glob("frame_*.usdc"), self._clips / STATIC, self._clips / MANIFEST]:
-                file.unlink(missing_ok=True)
-            if not any(self._clips.iterdir()):
-                self._clips.rmdir()
+        files = [*self._path.parent.glob(f"{escape(self._path.stem)}.part.*")]
+        files += [file for pattern in ("frame_*", "static.*", "manifest.*") for file in self._clips.glob(pattern)]
+        for file in files:
+            file.unlink(missing_ok=True)
+        if self._clips.is_dir() and not any(self._clips.iterdir()):
+            self._clips.rmdir()
+
+
+def _static(contents: Contents) -> Any:
+    """Every prim, and every value that does not change."""
+    layer = Sdf.Layer.CreateAnonymous(".usdc")
+    author_static(layer, contents)
+    return layer
 
 
 def _manifest(types: Mapping[str, Any]) -> Any:
@@ -216,26 +229,17 @@ def _manifest(types: Mapping[str, Any]) -> Any:
 
 
 def _export(layer: Any, path: Path) -> None:
-    with whole_file(path) as part:
-        try:
-            layer.Export(str(part))
-        except Tf.ErrorException as error:
-            raise OSError(_reason(error)) from error
+    with whole_file(path) as part, _errors_of_usd():
+        if not path.parent.is_dir():  # USD would make it anew, without the frames before
+            raise NotADirectoryError("the directory is gone")
+        layer.Export(str(part))
 
 
-def _reason(error: Exception) -> str:
-    """The first message of an error of USD, which wraps it in source file names and line numbers."""
-    message = re.search(r": '(.*?)'\s*$", str(error), re.MULTILINE)
-    return message.group(1) if message else str(error).strip().splitlines()[0]
-
-
-def _checked(name: str, values: np.ndarray, shape: tuple[int, ...], kind: type = np.float32) -> np.ndarray:
-    if values.shape != shape:
-        raise ValueError(f"frame: {name}: expected shape {shape}, got {values.shape}")
-    return np.ascontiguousarray(values, dtype=kind)
-
-
-def _extent(position: np.ndarray, widths: np.ndarray) -> Any:
-    """Lower and upper corner of the box around all particles, widths included."""
-    half = 0.5 * widths[:, None]
-    return Vt.Vec3fArray.FromNumpy(np.stack([(position - half).min(axis=0), (position + half).max(axis=0)]))
+@contextmanager
+def _errors_of_usd() -> Iterator[None]:
+    """Raise OSError for what USD could not do: its first message, which it wraps in names of source files."""
+    try:
+        yield
+    except Tf.ErrorException as error:
+        message = re.search(r": '(.*?)'\s*$", str(error), re.MULTILINE)
+        raise OSError(message.group(1) if message else str(error).strip().splitlines()[0]) from error

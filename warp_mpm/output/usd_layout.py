@@ -3,6 +3,7 @@
     /World                  Xform, kind component; time-sampled blast:time [s]
     /World/particles        Points: points, extent, widths, ids, primvars pressure, displayColor and further fields
     /World/section          Mesh: the field pressure on the scene's section plane
+    /World/isosurface       Mesh, if asked for: where the field pressure has a given value; time-sampled topology
     /World/detonators       one prim each, with position and ignition time
     /World/camera           frames the charge
     /World/materials        a material that glows in displayColor and reflects nothing
@@ -12,7 +13,7 @@ makes Blender drop the rest.
 """
 
 import math
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from warp_mpm.scene import Scene, Wall
 WORLD = "/World"
 PARTICLES = "/World/particles"
 SECTION = "/World/section"
+ISOSURFACE = "/World/isosurface"
 DETONATORS = "/World/detonators"
 CAMERA = "/World/camera"
 MATERIALS = "/World/materials"
@@ -36,34 +38,51 @@ FIELD_UNITS = {"density": "kg/m3", "burn_fraction": "1", "arrival_time": "s", "p
 _FLOATS = Sdf.ValueTypeNames.FloatArray
 _INTEGERS = Sdf.ValueTypeNames.IntArray
 _VECTORS = Sdf.ValueTypeNames.Float3Array
+_POINTS = Sdf.ValueTypeNames.Point3fArray
 
 
-def animated_attributes(scene: Scene, fields: Sequence[str]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Contents:
+    """What of a run a USD file shows."""
+
+    scene: Scene
+    pressure_range: tuple[float, float]  # in the first and the last colour [Pa]
+    fields: tuple[str, ...] = ()  # further particle fields, keys of `FIELD_UNITS`
+    particles_every: int = 1  # one particle in so many, in creation order
+    isosurface: float | None = None  # pressure [Pa]
+
+
+def animated_attributes(contents: Contents) -> dict[str, Any]:
     """Path and value type of every attribute that has a time sample per frame.
 
     The widths are among them only where a face is open, because only there a particle can leave.
     """
     attributes = {
         f"{WORLD}.blast:time": Sdf.ValueTypeNames.Double,
-        f"{PARTICLES}.points": Sdf.ValueTypeNames.Point3fArray,
+        f"{PARTICLES}.points": _POINTS,
         f"{PARTICLES}.extent": _VECTORS,
         f"{PARTICLES}.primvars:pressure": _FLOATS,
         f"{PARTICLES}.primvars:displayColor:indices": _INTEGERS,
         f"{SECTION}.primvars:pressure": _FLOATS,
         f"{SECTION}.primvars:displayColor:indices": _INTEGERS,
     }
-    if Wall.OPEN in scene.walls.faces():
+    if Wall.OPEN in contents.scene.walls.faces():
         attributes[f"{PARTICLES}.widths"] = _FLOATS
-    for name in fields:
+    for name in contents.fields:
         attributes[f"{PARTICLES}.primvars:{name}"] = _field_type(name)
+    if contents.isosurface is not None:
+        attributes[f"{ISOSURFACE}.points"] = _POINTS
+        attributes[f"{ISOSURFACE}.extent"] = _VECTORS
+        attributes[f"{ISOSURFACE}.faceVertexCounts"] = _INTEGERS
+        attributes[f"{ISOSURFACE}.faceVertexIndices"] = _INTEGERS
+        attributes[f"{ISOSURFACE}.visibility"] = Sdf.ValueTypeNames.Token
     return attributes
 
 
-def author_stage_metadata(
-    layer: Any, scene: Scene, pressure_range: tuple[float, float], microseconds_per_time_code: float, frames: int
-) -> None:
+def author_stage_metadata(layer: Any, contents: Contents, microseconds_per_time_code: float, frames: int) -> None:
     """Say in the layer's header what the stage is: units, time codes of `frames` frames, what the colours mean."""
     layer.defaultPrim = Sdf.Path(WORLD).name
+    scene = contents.scene
     layer.documentation = " ".join((scene.description or scene.name).split())
     layer.timeCodesPerSecond = layer.framesPerSecond = TIME_CODES_PER_SECOND
     layer.startTimeCode = 0.0
@@ -75,12 +94,14 @@ def author_stage_metadata(
         "microsecondsPerTimeCode": microseconds_per_time_code,
         "pressureUnit": "Pa",
         "colorMap": colormap.NAME,
-        "colorRange": Gf.Vec2d(*pressure_range),
+        "colorRange": Gf.Vec2d(*contents.pressure_range),
+        "particlesEvery": contents.particles_every,
     }
 
 
-def author_static(layer: Any, scene: Scene, fields: Sequence[str]) -> None:
+def author_static(layer: Any, contents: Contents) -> None:
     """Author every prim, every value that does not change, and declare every attribute that does."""
+    scene = contents.scene
     stage = Usd.Stage.Open(layer)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -89,16 +110,22 @@ def author_static(layer: Any, scene: Scene, fields: Sequence[str]) -> None:
     world.CreateAttribute("blast:time", Sdf.ValueTypeNames.Double).SetDocumentation("physical time [s]")
     stage.SetDefaultPrim(world)
     material = _author_material(stage)
-    _author_particles(stage, scene, fields, material)
+    _author_particles(stage, contents, material)
     _author_section(stage, scene, material)
+    if contents.isosurface is not None:
+        _author_isosurface(stage, contents.isosurface, contents.pressure_range)
     _author_detonators(stage, scene, material)
     _author_camera(stage, scene)
 
 
-def particle_widths(scene: Scene) -> np.ndarray:
-    """Diameter at which each particle is drawn [m], (particles,) float32: the edge of a cube of its initial volume."""
-    widths = [np.full(len(charge.positions), np.cbrt(charge.particle_volume)) for charge in scene.charges]
-    return np.concatenate(widths).astype(np.float32)
+def particle_widths(contents: Contents) -> np.ndarray:
+    """Diameter at which each particle is drawn [m], (particles shown,) float32.
+
+    It is the edge of a cube of the particle's initial volume, and of that of the particles left out for it.
+    """
+    volumes = [np.full(len(charge.positions), charge.particle_volume) for charge in contents.scene.charges]
+    shown = np.concatenate(volumes)[:: contents.particles_every]
+    return np.cbrt(contents.particles_every * shown).astype(np.float32)
 
 
 def section_axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -108,15 +135,16 @@ def section_axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return u, v
 
 
-def _author_particles(stage: Any, scene: Scene, fields: Sequence[str], material: Any) -> None:
+def _author_particles(stage: Any, contents: Contents, material: Any) -> None:
     points = UsdGeom.Points.Define(stage, PARTICLES)
     points.CreatePointsAttr()
     points.CreateExtentAttr()
-    points.CreateWidthsAttr(Vt.FloatArray.FromNumpy(particle_widths(scene)))
+    points.CreateWidthsAttr(Vt.FloatArray.FromNumpy(particle_widths(contents)))
     points.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
-    points.CreateIdsAttr(Vt.Int64Array.FromNumpy(np.arange(scene.particle_count, dtype=np.int64)))
+    ids = np.arange(0, contents.scene.particle_count, contents.particles_every, dtype=np.int64)
+    points.CreateIdsAttr(Vt.Int64Array.FromNumpy(ids))
     _declare_pressure(points)
-    for name in fields:
+    for name in contents.fields:
         primvar = UsdGeom.PrimvarsAPI(points).CreatePrimvar(name, _field_type(name), UsdGeom.Tokens.vertex)
         primvar.GetAttr().SetDocumentation(f"{name} [{FIELD_UNITS[name]}]")
     UsdShade.MaterialBindingAPI.Apply(points.GetPrim()).Bind(material)
@@ -137,10 +165,33 @@ def _author_section(stage: Any, scene: Scene, material: Any) -> None:
     mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(quads), 4, dtype=np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(quads.ravel().astype(np.int32)))
+    normal = np.cross(*np.eye(3, dtype=np.float32)[[first, second]])
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.tile(normal, (len(points), 1))))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateDoubleSidedAttr(True)
     _declare_pressure(mesh)
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _author_isosurface(stage: Any, pressure: float, pressure_range: tuple[float, float]) -> None:
+    """A surface in the one colour of its pressure; no glowing material, because light shows its shape.
+
+    It has no normals, which would have to be sampled too: a subdivision surface is smooth without them.
+    """
+    mesh = UsdGeom.Mesh.Define(stage, ISOSURFACE)
+    mesh.CreatePointsAttr()
+    mesh.CreateExtentAttr()
+    mesh.CreateFaceVertexCountsAttr()
+    mesh.CreateFaceVertexIndicesAttr()
+    mesh.CreateVisibilityAttr()
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.loop)
+    mesh.CreateDoubleSidedAttr(True)
+    color = colormap.linear_table()[colormap.indices(np.float32([pressure]), *pressure_range)]
+    mesh.CreateDisplayColorAttr(Vt.Vec3fArray.FromNumpy(color))
+    attribute = mesh.GetPrim().CreateAttribute("blast:pressure", Sdf.ValueTypeNames.Double)
+    attribute.Set(pressure)
+    attribute.SetDocumentation("field pressure on the surface [Pa]")
 
 
 def _declare_pressure(shape: Any) -> None:

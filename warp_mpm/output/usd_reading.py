@@ -7,14 +7,7 @@ from pxr import Tf, Usd
 
 from warp_mpm.checks import mistake
 from warp_mpm.errors import InputError
-
-SUFFIXES = (".usdc", ".usda", ".usdz", ".usd")  # in the order in which they are looked for
-
-
-def usd_files(directory: Path) -> list[Path]:
-    """The whole USD files of a directory, a merged one first; not what a killed run left half written."""
-    files = [file for suffix in SUFFIXES for file in sorted(directory.glob(f"*{suffix}"))]
-    return [file for file in files if not file.stem.endswith(".part")]
+from warp_mpm.run_directory import usd_files
 
 
 def usd_file(where: str, path: Path) -> Path:

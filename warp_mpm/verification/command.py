@@ -8,6 +8,7 @@ from rich.console import Console
 
 from warp_mpm.errors import VerificationError
 from warp_mpm.guards import writable_directory
+from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.verification.problem import Level, Problem
 from warp_mpm.verification.progress import level_progress
 from warp_mpm.verification.report import broken_bounds, print_opening, print_problem, print_verdict, write_json
@@ -48,7 +49,7 @@ def verify(
     draw = _painter(console)
     print_opening(console, setup.config)
     reports: list[ProblemReport] = []
-    run = {"full": full, "levels": coarsest, "device": setup.device, "threads": setup.threads}
+    run = {"full": full, "levels": coarsest, "device": setup.device, "threads": setup.threads, "precision": PRECISION}
     for problem, levels in chosen:
         try:
             reports.append(run_problem(problem, levels, setup))

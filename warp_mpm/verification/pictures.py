@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from warp_mpm.output.figures import SERIES, STYLE
+from warp_mpm.output.figures.style import SERIES, STYLE
 from warp_mpm.output.whole_file import whole_file
 from warp_mpm.verification.problem import Axis, Curve, LevelResult, Panel
 from warp_mpm.verification.session import ProblemReport, words_of

@@ -1,0 +1,81 @@
+"""The pressure along the scene's line over time, with the fronts that theory expects on top."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from warp_mpm.exact.arrival import straight_arrival
+from warp_mpm.output import colormap
+from warp_mpm.output.figures.content import cj_pressure, pressure_range, setup_of, step_record
+from warp_mpm.output.figures.style import (
+    GIGAPASCAL,
+    MARK,
+    MICROSECOND,
+    MILLIMETRE,
+    SERIES,
+    NothingToDrawError,
+    draw_cj_line,
+    draw_pressure_bar,
+    new_figure,
+)
+from warp_mpm.output.frame import LineRecord
+from warp_mpm.run_directory import Run
+
+
+def front_figure(run: Run) -> Figure:
+    """Distance and time; above it the highest pressure that each point of the line ever saw.
+
+    Raises:
+        NothingToDrawError: the scene has no line, or the run was killed.
+    """
+    record = step_record(run).line
+    if record is None:
+        raise NothingToDrawError("the scene names neither a line nor a front_path")
+    lower, upper = pressure_range(run)
+    distance = record.distance / MILLIMETRE
+    figure = new_figure((5.6, 5.6))
+    peak, axes = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.6))
+    times, pressure = _even_times(record)
+    image = axes.imshow(
+        pressure / GIGAPASCAL,
+        origin="lower",
+        aspect="auto",
+        interpolation="bilinear",
+        cmap=colormap.NAME,
+        vmin=lower / GIGAPASCAL,
+        vmax=upper / GIGAPASCAL,
+        extent=(distance[0], distance[-1], times[0] / MICROSECOND, times[-1] / MICROSECOND),
+    )
+    _draw_fronts(axes, run, record)
+    axes.set_xlabel("distance along the line [mm]")
+    axes.set_ylabel("time [µs]")
+    peak.plot(distance, record.pressure.max(axis=0) / GIGAPASCAL, color=SERIES[0])
+    peak.set_ylabel("peak [GPa]")
+    draw_cj_line(peak, cj_pressure(run))
+    peak.set_ylim(bottom=0.0)
+    draw_pressure_bar(figure, image, axes, cj_pressure(run), shrink=1.0)
+    return figure
+
+
+def _even_times(record: LineRecord, rows: int = 1000) -> tuple[np.ndarray, np.ndarray]:
+    """The record on evenly spaced times, for an image: (rows,) [s] and (rows, points) [Pa]."""
+    times = np.linspace(record.time[0], record.time[-1], rows)
+    after = np.clip(np.searchsorted(record.time, times), 1, len(record.time) - 1)
+    share = (times - record.time[after - 1]) / (record.time[after] - record.time[after - 1])
+    before = record.pressure[after - 1]
+    return times, before + share[:, None] * (record.pressure[after] - before)
+
+
+def _draw_fronts(axes: Axes, run: Run, record: LineRecord) -> None:
+    """When the first front should arrive, and so where fronts should meet: the least t_i + |x - x_i| / D."""
+    setup, speed = setup_of(run), run.summary.get("detonation_speed_m_s")
+    if speed is None or setup.line is None:
+        return
+    along = np.linspace(record.distance[0], record.distance[-1], 1000)  # finer than the record: the corners stay sharp
+    share = along[:, None] / setup.line.length
+    points = (1.0 - share) * np.array(setup.line.start) + share * np.array(setup.line.end)
+    arrival = straight_arrival(setup.detonators, points, speed)
+    label = f"fronts at D = {speed:.0f} m/s"
+    axes.plot(along / MILLIMETRE, arrival / MICROSECOND, color=MARK, linewidth=0.9, linestyle=(0, (6, 3)), label=label)
+    axes.set_ylim(record.time[0] / MICROSECOND, record.time[-1] / MICROSECOND)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
