@@ -1,6 +1,11 @@
 """The material update: density, motion, burn fraction and pressure, from what a step did to a particle (`strain.py`).
 
-Composed from shape x order of the step x equation of state x burn law.
+Composed from shape x order of the step x equation of state x burn law x unreacted state. What has burnt has the
+pressure of the products, p(rho, e), the rest that of the unreacted state, p(rho, e - E0), or none without such a state:
+
+    p = F p_products(rho, e) + (1 - F) max(p_unreacted(rho, e - E0), 0).
+
+E0 is the energy before the burn, which is chemical. Unburnt explosive carries no tension.
 """
 
 import functools
@@ -12,7 +17,7 @@ from warp_mpm.kernels.content import FILLING, PRESSURE, inside
 from warp_mpm.kernels.motion import Faces, place, settle
 from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Clock, Grid, Maxima, Particles, raise_maxima
-from warp_mpm.kernels.relaxation import relax_density
+from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, gas_share, relax_density
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
 from warp_mpm.kernels.transfer import look_ahead_function
@@ -42,14 +47,15 @@ class Response:
     closing_rate: scalar  # d of the viscosity [1/s], where there is any
     viscous_pressure: scalar  # its isotropic part [Pa]
     viscous_thrust: vector3  # its directed part is the pressure tensor s s^T [Pa]
-    sound_speed: scalar  # of the products, burnt or not [m/s]
+    sound_speed: scalar  # of the products, burnt or not; of the mixture where there is an unreacted state [m/s]
+    elastic_speed: scalar  # of small changes of the pressure: 0 where matter not yet burnt has none [m/s]
 
 
 @functools.cache
-def response_function(eos: Any, burn: Any) -> wp.Function:
+def response_function(eos: Any, burn: Any, unreacted: Any = None) -> wp.Function:
     """Device function: burn fraction, pressure, viscous pressure and sound speed from density and energy.
 
-    `eos` is a class of `eos/`, `burn` a class of `burn/` or None.
+    `eos` is a class of `eos/`, `burn` a class of `burn/` or None, `unreacted` a class of `eos/` or None.
     """
     pressure_offset, pressure_slope = eos.pressure_offset, eos.pressure_slope
     sound_speed_squared = eos.sound_speed_squared
@@ -57,11 +63,18 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
     burn_fraction = burn.burn_fraction if burns else None
+    resists = unreacted is not None  # before it burns
+    unreacted_record = unreacted.Record if resists else wp.int32
+    unreacted_offset = unreacted.pressure_offset if resists else None
+    unreacted_slope = unreacted.pressure_slope if resists else None
+    unreacted_sound_squared = unreacted.sound_speed_squared if resists else None
 
     @wp.func
     def respond(
         eos_parameters: eos_record,
         burn_parameters: burn_record,
+        unreacted_parameters: unreacted_record,
+        chemical_energy: scalar,
         viscosity: Viscosity,
         density: scalar,
         energy: scalar,
@@ -79,14 +92,28 @@ def response_function(eos: Any, burn: Any) -> wp.Function:
         products = pressure_offset(eos_parameters, density) + pressure_slope(eos_parameters, density) * energy
         result.burn_fraction = burnt
         result.pressure = burnt * products
-        result.sound_speed = wp.sqrt(wp.max(sound_speed_squared(eos_parameters, density, energy), ZERO))
-        if wp.min(closing, divergence) < ZERO and burnt > ZERO:  # nothing closes in most of an expanding gas
+        squared = sound_speed_squared(eos_parameters, density, energy)
+        pushes_back = burnt > ZERO
+        if wp.static(resists):
+            thermal = energy - chemical_energy
+            solid = unreacted_offset(unreacted_parameters, density)
+            solid += unreacted_slope(unreacted_parameters, density) * thermal
+            result.pressure += (ONE - burnt) * wp.max(solid, ZERO)
+            solid_squared = unreacted_sound_squared(unreacted_parameters, density, thermal)
+            squared = burnt * squared + (ONE - burnt) * solid_squared
+            pushes_back = True
+        result.sound_speed = wp.sqrt(wp.max(squared, ZERO))
+        result.elastic_speed = result.sound_speed
+        if wp.static(not resists):
+            result.elastic_speed = wp.sqrt(burnt) * result.sound_speed
+        if wp.min(closing, divergence) < ZERO and pushes_back:  # nothing closes in most of an expanding gas
             axis = directedness(viscosity, result.sound_speed, divergence) * direction
             share = wp.dot(axis, axis)
             result.closing_rate = closing_rate(share, closing, divergence)
             length = viscous_length(viscosity, axis)
             q = viscous_pressure(viscosity, length, density, result.sound_speed, result.closing_rate)
-            q *= wp.min(burnt * PER_IGNITED, ONE)
+            if wp.static(not resists):
+                q *= wp.min(burnt * PER_IGNITED, ONE)
             result.viscous_pressure = q * (ONE - share)
             result.viscous_thrust = wp.sqrt(q) * axis
         return result
@@ -118,18 +145,21 @@ def raise_burn_speed(maxima: wp.array(dtype=Maxima), slab: int, burnt: scalar, s
 
 
 @functools.cache
-def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
+def initial_kernel(eos: Any, burn: Any, unreacted: Any = None) -> wp.Kernel:
     """Burn fraction, pressure and rates at the start, from the initial density and energy."""
-    respond = response_function(eos, burn)
+    respond = response_function(eos, burn, unreacted)
     eos_record = eos.Record
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
+    unreacted_record = wp.int32 if unreacted is None else unreacted.Record
 
     @wp.kernel(enable_backward=False, module="unique")
     def initialise(
         particles: Particles,
         eos_parameters: eos_record,
         burn_parameters: burn_record,
+        unreacted_parameters: unreacted_record,
+        chemical_energy: scalar,
         viscosity: Viscosity,
         maxima: wp.array(dtype=Maxima),
         slab: int,
@@ -146,6 +176,8 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
         response = respond(
             eos_parameters,
             burn_parameters,
+            unreacted_parameters,
+            chemical_energy,
             viscosity,
             density,
             energy,
@@ -157,7 +189,7 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
             since_booster,
         )
         particles.matter[p].pressure = response.pressure
-        particles.matter[p].sound_speed = wp.sqrt(response.burn_fraction) * response.sound_speed
+        particles.matter[p].sound_speed = response.elastic_speed
         raise_maxima(maxima, slab, rates(response, viscosity, particles.motion[p].velocity, ZERO, ZERO))
         if wp.static(burns):
             particles.matter[p].burn_fraction = response.burn_fraction
@@ -168,16 +200,26 @@ def initial_kernel(eos: Any, burn: Any) -> wp.Kernel:
 
 @functools.cache
 def update_kernel(
-    shape: Shape, strain: Strain, damped: bool, move: bool, eos: Any, burn: Any, thin: bool = False
+    shape: Shape,
+    strain: Strain,
+    damped: bool,
+    move: bool,
+    eos: Any,
+    burn: Any,
+    unreacted: Any = None,
+    thin: bool = False,
 ) -> wp.Kernel:
     """Strain, energy, density, damping, motion (`move`), then burn fraction and pressure for the next forces."""
     deform = deformation_function(shape, strain, damped)
     look_ahead = look_ahead_function(shape, False, strain is Strain.REPROJECTED)
-    respond = response_function(eos, burn)
+    respond = response_function(eos, burn, unreacted)
     sound_speed_squared = eos.sound_speed_squared
+    passive = eos.passive_volume
+    equalisation = PASSIVE_EQUALISATION if passive else ACTIVE_EQUALISATION
     eos_record = eos.Record
     burns = burn is not None
     burn_record = burn.Record if burns else wp.int32
+    unreacted_record = wp.int32 if unreacted is None else unreacted.Record
 
     @wp.kernel(enable_backward=False, module="unique")
     def update(
@@ -187,6 +229,8 @@ def update_kernel(
         clock: wp.array(dtype=Clock),
         eos_parameters: eos_record,
         burn_parameters: burn_record,
+        unreacted_parameters: unreacted_record,
+        chemical_energy: scalar,
         viscosity: Viscosity,
         half_width: scalar,
         ambient_pressure: scalar,
@@ -219,20 +263,26 @@ def update_kernel(
             wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
             energy = ZERO
 
-        # Density follows the strain, and inside the material relaxes to room and pressure around it.
+        # Density follows the strain, and inside the material relaxes to the room, and the pressure, around it.
         density = matter.density / (ONE + dt * step.divergence)
         burnt = ONE
         if wp.static(burns):
             burnt = matter.burn_fraction
-        # An ambient pressure pushes on volumes, which the relaxation would then change without doing work.
-        if wp.static(damped) and burnt > BURNT_OUT and ambient_pressure == ZERO:
+        # An ambient pressure pushes on volumes that are passive otherwise: relaxing them would start a motion.
+        relaxes = burnt > BURNT_OUT
+        if wp.static(passive):
+            relaxes = relaxes and ambient_pressure == ZERO
+        if wp.static(damped) and relaxes:
             squared = sound_speed_squared(eos_parameters, density, energy)
             onset = (burnt - BURNT_OUT) * PER_BURNT_OUT
             filling = step.around[FILLING]
             if squared > ZERO:
-                excess = (matter.pressure - step.around[PRESSURE]) / (density * squared)
+                modulus = density * squared
+                excess = (matter.pressure - step.around[PRESSURE]) / modulus
                 crossing = onset * inside(filling) * dt * wp.sqrt(squared) * viscosity.inverse_length
-                density = relax_density(density, filling, excess, crossing)
+                if wp.static(not passive):
+                    crossing *= gas_share(matter.pressure - ambient_pressure, modulus)
+                density = relax_density(density, filling, excess, crossing, equalisation)
 
         moved = ZERO
         if wp.static(move):
@@ -252,6 +302,8 @@ def update_kernel(
         response = respond(
             eos_parameters,
             burn_parameters,
+            unreacted_parameters,
+            chemical_energy,
             viscosity,
             density,
             energy,
@@ -268,7 +320,7 @@ def update_kernel(
         matter.viscous_pressure = response.viscous_pressure
         matter.viscous_thrust = response.viscous_thrust
         matter.burn_fraction = response.burn_fraction
-        matter.sound_speed = wp.sqrt(response.burn_fraction) * response.sound_speed
+        matter.sound_speed = response.elastic_speed
         particles.matter[p] = matter
         raise_maxima(maxima, slab, rates(response, viscosity, motion.velocity, step.divergence, moved))
         if wp.static(burns):

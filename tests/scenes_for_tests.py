@@ -16,6 +16,7 @@ from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box
 from warp_mpm.kernels import transfer
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.kernels.eos.jwl import JWL
 from warp_mpm.kernels.precision import DIGITS
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.materials import Material, ammonium_nitrate
@@ -28,6 +29,7 @@ CELL = 0.01  # edge of a cell [m]
 ROUND_OFF = 0.5**DIGITS  # of a number, relative; 6e-8 in single precision
 OPEN = Walls.all(Wall.OPEN)
 STICK = Walls.all(Wall.STICK)
+TNT = JWL(density=1630.0, a=371.21e9, b=3.231e9, r1=4.15, r2=0.95, omega=0.30)  # its energy: 7e9 J/m3
 CORNER = PointDetonator((0.0, 0.0, 0.0))
 
 

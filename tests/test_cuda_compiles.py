@@ -5,7 +5,10 @@ import warp as wp
 
 from warp_mpm.kernels import gauges, grid, material, reduce, shape, sharpen, strain, transfer
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
+from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.kernels.eos.jwl import JWL
+from warp_mpm.kernels.eos.mie_gruneisen import MieGruneisen
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
 
 ARCHITECTURE = 75  # the oldest that current Warp supports
@@ -15,6 +18,9 @@ KERNELS = {
     "advance": lambda: transfer.advance_kernel(shape.BSPLINE, False, False, True, True),
     "update": lambda: material.update_kernel(
         shape.BSPLINE, strain.Strain.REPROJECTED, True, True, IdealGas, ProgrammedBurn
+    ),
+    "update_jwl": lambda: material.update_kernel(
+        shape.BSPLINE, strain.Strain.REPROJECTED, True, True, JWL, ProgrammedCompressionBurn, MieGruneisen
     ),
     "clear": grid.clear_kernel,
     "solve": lambda: grid.solve_kernel(True, True, True),

@@ -81,6 +81,7 @@ def test_figures_of_a_known_front():
     assert figures["front_pressure_pa"] == pytest.approx(0.7 * height, rel=0.01)  # half-way from 50 to 90 %
     assert figures["collision_pressures_pa"] == [pytest.approx(2.4 * height)]
     assert figures["collision_pressure_pa"] == pytest.approx(2.4 * height)
+    assert figures["collision_theory_pa"] == pytest.approx(2.443 * figures["p_cj_pa"], rel=3e-4)  # gamma = 2
     assert figures["peak_pressure_pa"] == pytest.approx(height)
     assert figures["max_particle_pressure_pa"] == pytest.approx(1.5 * height)
     assert figures["collision_positions_m"] == [pytest.approx(LENGTH / 2 + speed * DELAY / 2, abs=0.25 * way)]

@@ -20,7 +20,12 @@ if TYPE_CHECKING:
     from warp_mpm.errors import InputError, SimulationError
     from warp_mpm.geometry import Box, Cylinder, Sphere
     from warp_mpm.kernels.eos.ideal_gas import IdealGas
-    from warp_mpm.materials import Material, OnMismatch, ammonium_nitrate, explosive
+    from warp_mpm.kernels.eos.jwl import JWL
+    from warp_mpm.kernels.eos.mie_gruneisen import MieGruneisen
+    from warp_mpm.kernels.eos.stiffened_gas import StiffenedGas
+    from warp_mpm.material_files import load_materials
+    from warp_mpm.material_library import air, find_material, library, water
+    from warp_mpm.materials import Burn, Material, OnMismatch, ammonium_nitrate, explosive, inert
     from warp_mpm.run_directory import Run, load
     from warp_mpm.scene import Scene, Wall, Walls
     from warp_mpm.scene_loading import list_scenes, load_scene
@@ -29,12 +34,15 @@ if TYPE_CHECKING:
 __version__ = version.VERSION
 
 __all__ = [
+    "JWL",
     "Box",
+    "Burn",
     "Cylinder",
     "IdealGas",
     "InputError",
     "Layout",
     "Material",
+    "MieGruneisen",
     "OnMismatch",
     "Order",
     "PlaneDetonator",
@@ -48,16 +56,23 @@ __all__ = [
     "SimulationError",
     "SolverConfig",
     "Sphere",
+    "StiffenedGas",
     "Transfer",
     "Wall",
     "Walls",
     "__version__",
+    "air",
     "ammonium_nitrate",
     "explosive",
+    "find_material",
+    "inert",
+    "library",
     "list_scenes",
     "load",
+    "load_materials",
     "load_scene",
     "simulate",
+    "water",
 ]
 
 _HOMES = {
@@ -67,7 +82,12 @@ _HOMES = {
     "errors": ("InputError", "SimulationError"),
     "geometry": ("Box", "Cylinder", "Sphere"),
     "kernels.eos.ideal_gas": ("IdealGas",),
-    "materials": ("Material", "OnMismatch", "ammonium_nitrate", "explosive"),
+    "kernels.eos.jwl": ("JWL",),
+    "kernels.eos.mie_gruneisen": ("MieGruneisen",),
+    "kernels.eos.stiffened_gas": ("StiffenedGas",),
+    "material_files": ("load_materials",),
+    "material_library": ("air", "find_material", "library", "water"),
+    "materials": ("Burn", "Material", "OnMismatch", "ammonium_nitrate", "explosive", "inert"),
     "run_directory": ("Run", "load"),
     "scene": ("Scene", "Wall", "Walls"),
     "scene_loading": ("list_scenes", "load_scene"),

@@ -84,6 +84,11 @@ def _parser() -> argparse.ArgumentParser:
     scenes.set_defaults(command=_list)
     scenes.add_argument("directory", metavar="DIR", nargs="?", help="default: ./scenes and the shipped scenes")
 
+    text = "Materials with the speed and pressure stated for them, and those that their equation of state implies."
+    materials = commands.add_parser("materials", parents=[common], help="list materials", description=text)
+    materials.set_defaults(command=_materials)
+    materials.add_argument("file", metavar="FILE", nargs="?", help="a TOML file of materials (default: the library)")
+
     _add_result_commands(commands, common)
 
     text = "Solve problems with exact answers: error tables, pictures, and exit code 1 when a bound is broken."
@@ -260,6 +265,21 @@ def _list(options: argparse.Namespace) -> None:
     width = max((len(scene.name) for scene in scenes), default=0)
     for scene in scenes:
         print(f"{scene.name:{width}}  {scene.summary}")
+
+
+def _materials(options: argparse.Namespace) -> None:
+    """Print the materials of the library, or those of a file.
+
+    Raises:
+        InputError: the file is not one of materials.
+    """
+    from warp_mpm.material_files import load_materials
+    from warp_mpm.material_library import library
+    from warp_mpm.output.materials_table import print_materials
+    from warp_mpm.warp_startup import start_quietly
+
+    start_quietly()
+    print_materials(library() if options.file is None else load_materials(options.file))
 
 
 def _info(options: argparse.Namespace) -> None:

@@ -6,14 +6,22 @@ from enum import Enum
 from typing import Literal
 
 from warp_mpm.errors import InputError
-from warp_mpm.exact.chapman_jouguet import ChapmanJouguetState, chapman_jouguet_state, energy_for_speed
+from warp_mpm.exact.chapman_jouguet import (
+    ChapmanJouguetState,
+    chapman_jouguet_state,
+    energy_at_pressure,
+    energy_for_speed,
+)
 from warp_mpm.kernels.burn import BurnLaw
+from warp_mpm.kernels.burn.compression import CompressionBurn
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
+from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
 from warp_mpm.kernels.eos import EquationOfState
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.warp_startup import start_quietly
 
 ROUND_OFF = 1e-5  # relative difference of two speeds that are the same: single precision, and the digits people write
+ATMOSPHERE = 101325.0  # standard pressure [Pa]
 TOLERANCE = 0.01  # relative difference that is adjusted; more is an error
 
 
@@ -25,6 +33,18 @@ class OnMismatch(Enum):
 
     ADJUST = "adjust"
     KEEP = "keep"
+
+
+class Burn(Enum):
+    """When an explosive burns.
+
+    PROGRAMMED: when the wave from a detonator arrives, F1 of Wilkins. COMPRESSION: as far as it is compressed, F2 =
+    (1 - V) / (1 - V_CJ), so that anything that strikes it hard lights it. BOTH: the larger of the two.
+    """
+
+    PROGRAMMED = "programmed"
+    COMPRESSION = "compression"
+    BOTH = "both"
 
 
 @dataclass(frozen=True)
@@ -44,6 +64,10 @@ class Material:
     burn: BurnLaw | None = None  # None: inert, it is products from the start
     cj: ChapmanJouguetState | None = None  # what the equation of state implies
     warnings: tuple[str, ...] = ()  # what the check of the explosive has to say
+    unreacted: EquationOfState | None = None  # of what has not burnt, with energies from E0; None: it has no pressure
+    stated_speed: float | None = None  # detonation speed stated for it [m/s]
+    stated_pressure: float | None = None  # Chapman-Jouguet pressure stated for it [Pa]
+    citation: str = ""  # where the numbers are from
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -60,12 +84,17 @@ def explosive(
     energy: float | Literal["cj"] = "cj",
     cj_pressure: float | None = None,
     on_mismatch: OnMismatch = OnMismatch.ADJUST,
+    burn: Burn = Burn.PROGRAMMED,
+    unreacted: EquationOfState | None = None,
+    citation: str = "",
 ) -> Material:
-    """An explosive with programmed burn, checked: does its equation of state detonate at the stated speed?
+    """An explosive, checked: does its equation of state detonate at the stated speed?
 
     `density` [kg/m3] and `detonation_speed` [m/s] are those stated for it; `energy` [J/kg], or "cj" for the one that
     the Chapman-Jouguet condition gives; `cj_pressure` [Pa] is compared if stated. A wave that runs faster than the
     energy allows has a low front, and one that runs 0.5 % slower grows without bound, so they must match.
+    `burn` says when it burns. `unreacted` is the equation of state of what has not burnt, such as `MieGruneisen`, with
+    energies from E0; without it unburnt explosive has no pressure. `citation` says where the numbers are from.
 
     Raises:
         InputError: a value is not positive and finite, or speed or pressure do not match the equation of state.
@@ -83,7 +112,37 @@ def explosive(
     if cj_pressure is not None:
         _check_positive(name, "cj_pressure", cj_pressure, "Pa")
         warnings += _matched_pressure(name, cj_pressure, state, on_mismatch)
-    return Material(name, density, equation_of_state, specific_energy, ProgrammedBurn(speed), state, warnings)
+    return Material(
+        name,
+        density,
+        equation_of_state,
+        specific_energy,
+        burn=_burn_law(burn, speed, density, state),
+        cj=state,
+        warnings=warnings,
+        unreacted=unreacted,
+        stated_speed=detonation_speed,
+        stated_pressure=cj_pressure,
+        citation=citation,
+    )
+
+
+def inert(
+    name: str, *, density: float, equation_of_state: EquationOfState, pressure: float = ATMOSPHERE, citation: str = ""
+) -> Material:
+    """Matter that does not burn, at rest at a density [kg/m3] and a pressure [Pa].
+
+    Its energy follows from them, e = (p - a) / b.
+
+    Raises:
+        InputError: density or pressure is not positive and finite, or the energy that gives this pressure is not.
+    """
+    _check_positive(name, "density", density, "kg/m3")
+    _check_positive(name, "pressure", pressure, "Pa")
+    start_quietly()
+    return Material(
+        name, density, equation_of_state, energy_at_pressure(equation_of_state, density, pressure), citation=citation
+    )
 
 
 def ammonium_nitrate(*, energy: float | Literal["cj"] = "cj", on_mismatch: OnMismatch = OnMismatch.ADJUST) -> Material:
@@ -102,7 +161,16 @@ def ammonium_nitrate(*, energy: float | Literal["cj"] = "cj", on_mismatch: OnMis
         equation_of_state=IdealGas(gamma=2.0),
         energy=energy,
         on_mismatch=on_mismatch,
+        citation="Wang, Li, Wang, Yan, Sun, Applied Mathematics and Mechanics 36(2), 2015; energy by the CJ condition",
     )
+
+
+def _burn_law(burn: Burn, speed: float, density: float, state: ChapmanJouguetState) -> BurnLaw:
+    """The burn law of an explosive of initial `density` [kg/m3] whose wave runs at `speed` [m/s]."""
+    if burn is Burn.PROGRAMMED:
+        return ProgrammedBurn(speed)
+    both = burn is Burn.BOTH
+    return (ProgrammedCompressionBurn if both else CompressionBurn)(speed, density, state.density)
 
 
 def _matched_speed(

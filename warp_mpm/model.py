@@ -43,6 +43,7 @@ class ChargeModel:
     material: Material
     eos_record: Any
     burn_record: Any  # 0 for inert matter
+    unreacted_record: Any  # 0 where unburnt matter has no pressure
     half_width: float  # of a particle [cells]
     ignitions: tuple[Ignition, ...]
 
@@ -55,6 +56,21 @@ class ChargeModel:
     def burn_class(self) -> type | None:
         """Class of the burn law, None for inert matter."""
         return None if self.material.burn is None else type(self.material.burn)
+
+    @property
+    def unreacted_class(self) -> type | None:
+        """Class of the unreacted equation of state, None where unburnt matter has no pressure."""
+        return None if self.material.unreacted is None else type(self.material.unreacted)
+
+    @property
+    def classes(self) -> tuple[type, type | None, type | None]:
+        """What the material's kernels are composed of."""
+        return self.eos_class, self.burn_class, self.unreacted_class
+
+    @property
+    def records(self) -> tuple[Any, ...]:
+        """The parameters that these kernels take."""
+        return self.eos_record, self.burn_record, self.unreacted_record, self.material.specific_energy
 
 
 @dataclass(frozen=True)
@@ -139,12 +155,13 @@ def build_model(scene: Scene, config: SolverConfig, device: wp.Device) -> Model:
 
 
 def _charge_model(scene: Scene, charge: Charge, burn_width: float) -> ChargeModel:
-    burn = charge.material.burn
+    burn, unreacted = charge.material.burn, charge.material.unreacted
     spacing = max(scene.domain.spacing)
     return ChargeModel(
         material=charge.material,
         eos_record=charge.material.equation_of_state.record(),
         burn_record=0 if burn is None else burn.record(burn_width, spacing),
+        unreacted_record=0 if unreacted is None else unreacted.record(),
         half_width=0.5 / charge.particles_per_axis,
         ignitions=tuple(_ignition(scene, d, spacing) for d in scene.detonators if charge.name in d.charges),
     )

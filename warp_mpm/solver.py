@@ -120,10 +120,10 @@ class Solver:
         state, model = self.state, self.model
         for slab, charge, begin, count in self._groups():
             wp.launch(
-                material.initial_kernel(charge.eos_class, charge.burn_class),
+                material.initial_kernel(*charge.classes),
                 count,
                 inputs=[
-                    *(state.particles, charge.eos_record, charge.burn_record),
+                    *(state.particles, *charge.records),
                     *(model.viscosity, state.maxima, slab, begin),
                 ],
                 device=model.device,
@@ -203,9 +203,9 @@ class Solver:
         strain = STRAINS[order]
         self._update = self._per_slab(
             lambda slab, charge: (
-                material.update_kernel(shape, strain, model.damped, not usf, charge.eos_class, charge.burn_class, thin),
+                material.update_kernel(shape, strain, model.damped, not usf, *charge.classes, thin),
                 [
-                    *(state.particles, state.grid, model.faces, state.clock, charge.eos_record, charge.burn_record),
+                    *(state.particles, state.grid, model.faces, state.clock, *charge.records),
                     *(model.viscosity, charge.half_width, ambient, state.maxima, state.tallies, state.faults, slab),
                 ],
             )

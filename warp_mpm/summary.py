@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warp_mpm.exact.arrival import straight_arrival
+from warp_mpm.exact.reflection import collision_pressure
 from warp_mpm.materials import Material
 from warp_mpm.output.frame import LineRecord, StepRecord
 from warp_mpm.scene import Scene
@@ -127,6 +128,11 @@ def _arrival_fit(distance: np.ndarray, arrived: np.ndarray, source: float, end: 
     return float(slope), float(intercept)
 
 
+def collision_theory(material: Material) -> float:
+    """Pressure at the instant of contact where two plane fronts in this explosive meet head-on [Pa]."""
+    return collision_pressure(material.equation_of_state, material.density, material.specific_energy)
+
+
 def front_pressure(scene: Scene, record: StepRecord, material: Material) -> float | None:
     """Median over steps of the highest field pressure around the front path, late on its way [Pa]."""
     if record.path_pressure is None or material.burn is None or scene.front_path is None:
@@ -200,6 +206,7 @@ def figures_of_merit(scene: Scene, record: StepRecord) -> dict[str, object]:
         "front_offset_m": fit.offset if fit else None,
         "collision_pressure_pa": max(collisions) if collisions else None,
         "collision_pressures_pa": collisions,
+        "collision_theory_pa": collision_theory(material) if material is not None and collisions else None,
         "collision_positions_m": meeting_points(scene, record, material) if material is not None else [],
         "peak_pressure_pa": float(record.field_pressure.max()),
         "max_particle_pressure_pa": float(record.particle_pressure.max()),

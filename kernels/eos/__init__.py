@@ -6,6 +6,8 @@ dataclass (the host's side) whose class attributes name its device functions, ea
 * `pressure_offset(record, density)` -> a [Pa]
 * `pressure_slope(record, density)` -> b [kg/m3]
 * `sound_speed_squared(record, density, energy)` -> c^2 = (dp/drho)_s [m2/s2]
+* `passive_volume`: whether p V depends on the energy alone, a = 0 and b ~ rho, so that a volume which is a little wrong
+  moves nothing (see `relaxation.py`)
 * `Record`: the `wp.struct` they read; `record()` fills one.
 
 Energies are specific internal energies [J/kg] that contain the chemical energy.
@@ -25,6 +27,7 @@ class EquationOfState(Protocol):
     pressure_offset: wp.Function
     pressure_slope: wp.Function
     sound_speed_squared: wp.Function
+    passive_volume: bool
 
     def record(self) -> Any:
         """The device record of this equation of state."""
@@ -42,4 +45,4 @@ def evaluate(eos: EquationOfState, function: wp.Function, *numbers: float) -> fl
             if variable.type is scalar:
                 setattr(record, name, scalar(getattr(record, name)))
         return float(function(record, *map(scalar, numbers)))
-    return float(function(record, *numbers))
+    return float(function(record, *map(float, numbers)))

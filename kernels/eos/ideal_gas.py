@@ -47,6 +47,7 @@ class IdealGas:
     pressure_offset = pressure_offset
     pressure_slope = pressure_slope
     sound_speed_squared = sound_speed_squared
+    passive_volume = True
 
     def __post_init__(self) -> None:
         """Check gamma: at 1 or below, compression would not raise the pressure of a gas with energy."""

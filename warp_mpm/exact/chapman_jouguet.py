@@ -20,6 +20,8 @@ from warp_mpm.kernels.eos import EquationOfState, evaluate
 HIGHEST_COMPRESSION = 20.0  # rho / rho0 up to which the state is searched
 SEARCH_STEP = 1.01  # growth of rho in the search
 BISECTIONS = 40
+ITERATIONS = 20  # at most, for the energy; 3 to 8 are taken
+LARGEST_POWER = 8.0  # of D^2 that the energy may follow, where pressure at zero energy matters much
 
 
 @dataclass(frozen=True)
@@ -33,15 +35,34 @@ class ChapmanJouguetState:
     sound_speed: float  # c [m/s] = D - u
 
 
-def hugoniot_pressure(eos: EquationOfState, initial_density: float, energy: float, density: float) -> float:
-    """Pressure p_H [Pa] of products at `density` behind a wave into matter of specific energy `energy` [J/kg].
+def _linear(eos: EquationOfState, density: float) -> tuple[float, float]:
+    """The a [Pa] and b [kg/m3] of p = a + b e at a density [kg/m3]."""
+    return evaluate(eos, eos.pressure_offset, density), evaluate(eos, eos.pressure_slope, density)
 
-    Infinite beyond the strongest compression that the Hugoniot allows.
+
+def pressure_of(eos: EquationOfState, density: float, energy: float) -> float:
+    """Pressure p = a + b e [Pa] at a density [kg/m3] and a specific energy [J/kg]."""
+    offset, slope = _linear(eos, density)
+    return offset + slope * energy
+
+
+def energy_at_pressure(eos: EquationOfState, density: float, pressure: float) -> float:
+    """Specific energy e = (p - a) / b [J/kg] at a density [kg/m3] and a pressure [Pa]."""
+    offset, slope = _linear(eos, density)
+    return (pressure - offset) / slope
+
+
+def hugoniot_pressure(
+    eos: EquationOfState, initial_density: float, energy: float, density: float, initial_pressure: float = 0.0
+) -> float:
+    """Pressure p_H [Pa] of matter at `density` behind a wave into matter of specific energy `energy` [J/kg].
+
+    Infinite beyond the strongest compression that the Hugoniot e - E0 = (p + p0) (v0 - v) / 2 allows.
     """
-    offset = evaluate(eos, eos.pressure_offset, density)
-    slope = evaluate(eos, eos.pressure_slope, density)
-    room = 1.0 - 0.5 * slope * (1.0 / initial_density - 1.0 / density)
-    return (offset + slope * energy) / room if room > 0.0 else math.inf
+    offset, slope = _linear(eos, density)
+    half = 0.5 * (1.0 / initial_density - 1.0 / density)
+    room = 1.0 - slope * half
+    return (offset + slope * (energy + initial_pressure * half)) / room if room > 0.0 else math.inf
 
 
 def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: float) -> ChapmanJouguetState:
@@ -84,18 +105,25 @@ def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: 
 def energy_for_speed(eos: EquationOfState, initial_density: float, detonation_speed: float) -> float:
     """Specific energy E0 [J/kg] with which the equation of state detonates at a given speed [m/s].
 
-    D^2 is proportional to E0 for an ideal gas and nearly so for others, which makes the iteration a quick one.
+    D^2 is proportional to E0 for an ideal gas. For others it follows some power of E0, which the iteration finds:
+    secants of the logarithms.
 
     Raises:
         ValueError: there is no such energy.
     """
-    energy = 0.25 * detonation_speed**2
-    for _ in range(50):
+    energy, power = 0.25 * detonation_speed**2, 1.0
+    before: tuple[float, float] | None = None  # logarithms of the factor in energy and of what it did to D^2 / D'^2
+    for _ in range(ITERATIONS):
         implied = chapman_jouguet_state(eos, initial_density, energy).detonation_speed
         ratio = (detonation_speed / implied) ** 2
-        energy *= ratio
         if abs(ratio - 1.0) < 5e-7:
-            return energy
+            return energy * ratio
+        lacking = math.log(ratio)
+        if before is not None and before[1] != lacking:
+            power = min(max(before[0] / (before[1] - lacking), 1.0), LARGEST_POWER)
+        factor = ratio**power
+        before = math.log(factor), lacking
+        energy *= factor
     raise ValueError(f"{eos}: expected an energy that gives {detonation_speed:g} m/s, found none")
 
 
