@@ -21,14 +21,15 @@ def test_two_commands_set_up_everything():
     assert second in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
-def test_the_script_runs(tmp_path):
-    (script,) = blocks("python")
-    (tmp_path / "script.py").write_text(script, encoding="utf-8")
+def test_the_script_runs_and_its_results_are_read(tmp_path):
+    script, reading = blocks("python")
+    (tmp_path / "script.py").write_text(script + reading, encoding="utf-8")
     ended = subprocess.run(
         [sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
     )
     assert (ended.returncode, ended.stderr) == (0, "")
-    assert re.fullmatch(r"p_CJ 19\.6 GPa, peak 1\d\.\d GPa\n", ended.stdout)
+    printed = r"p_CJ 19\.6 GPa, peak 1\d\.\d GPa\n10\.\d us: \d\.\d GPa in \d+ particles\n"
+    assert re.fullmatch(printed, ended.stdout)
     assert (tmp_path / "out" / "ball" / "ball.usdc").exists()
 
 
