@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -11,7 +10,7 @@ from warp_mpm import checks
 from warp_mpm.cells import check_aspect, domain_of_cells
 from warp_mpm.charges import Body, charge_warnings, check_fit, cut_charges
 from warp_mpm.checks import mistake
-from warp_mpm.detonators import Detonator, PlaneDetonator
+from warp_mpm.detonators import Detonator, checked
 from warp_mpm.gauges import carried_gauges
 from warp_mpm.geometry import Solid
 from warp_mpm.ignition import resolve_detonators
@@ -123,6 +122,7 @@ class SceneBuilder:
         *,
         particles_per_axis: int = 2,
         velocity: Sequence[float] | Callable[[np.ndarray], np.ndarray] | None = None,
+        may_stay_unlit: bool = False,
         name: str | None = None,
     ) -> None:
         """Add a body of one material.
@@ -133,6 +133,7 @@ class SceneBuilder:
             particles_per_axis: particles along each axis of every cell.
             velocity: at the start [m/s]: one vector for all of it, or a function that turns positions (n, 3) [m] into
                 velocities (n, 3) [m/s] and is called by `build`; without one it is at rest.
+            may_stay_unlit: whether parts of an explosive may never detonate; else they are an error.
             name: for detonators and messages; without one "charge_1", "charge_2", ...
 
         Raises:
@@ -147,21 +148,21 @@ class SceneBuilder:
         per_axis = checks.count(f"{here}: particles_per_axis", particles_per_axis)
         if velocity is not None and not callable(velocity):
             velocity = checks.vector(f"{here}: velocity", velocity)
-        self._bodies.append(Body(name, solid, material, per_axis, velocity))
+        checks.instance(f"{here}: may_stay_unlit", may_stay_unlit, bool, "True or False")
+        self._bodies.append(Body(name, solid, material, per_axis, velocity, may_stay_unlit))
 
-    def detonator(self, detonator: Detonator) -> None:
-        """Add a detonator. One that names no charges lights the charge it lies in.
+    def detonator(self, *detonators: Detonator) -> None:
+        """Add a detonator, or several: `detonator(*ring(...))`. One that names no charges lights the charge it lies in.
+
+        Its wave runs through all explosives that touch, around what does not burn. To a charge that it names and does
+        not lie in it runs straight, whatever lies between.
 
         Raises:
-            InputError: not a detonator, a number is not finite, the time is negative, or a normal has no length.
+            InputError: not a detonator, a number is not finite, the time is negative, a normal or a line has no length,
+                or a radius or a speed is not positive.
         """
-        here = f"{self._here}: detonator {len(self._detonators) + 1}"
-        checks.instance(here, detonator, Detonator, "a PointDetonator or a PlaneDetonator")
-        position = checks.vector(f"{here}: position", detonator.position)
-        time = checks.not_negative(f"{here}: time", detonator.time)
-        if isinstance(detonator, PlaneDetonator) and not any(checks.vector(f"{here}: normal", detonator.normal)):
-            raise mistake(f"{here}: normal", "a vector of any length but 0", detonator.normal)
-        self._detonators.append(replace(detonator, position=position, time=time))
+        for detonator in detonators:
+            self._detonators.append(checked(f"{self._here}: detonator {len(self._detonators) + 1}", detonator))
 
     def gravity(self, acceleration: Sequence[float]) -> None:
         """Set a constant body force [m/s2]; without this there is none.

@@ -31,6 +31,7 @@ class Body:
     material: Material
     particles_per_axis: int  # along each axis of every cell
     velocity: Velocity | None = None  # at the start [m/s]; None: at rest
+    may_stay_unlit: bool = False  # an explosive to which no detonation needs to come
 
     @property
     def explosive(self) -> bool:
@@ -93,7 +94,12 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
             raise mistake(here, "at least one particle in it", "none", "choose a smaller cell size")
         velocities = _initial_velocities(f"{here}: velocity", body.velocity, positions)
         per_axis = body.particles_per_axis
-        charges.append(Charge(body.name, body.solid, body.material, positions, volume, tolerance, per_axis, velocities))
+        charges.append(
+            Charge(
+                *(body.name, body.solid, body.material, positions, volume, tolerance),
+                *(per_axis, velocities, body.may_stay_unlit),
+            )
+        )
     for first, second in combinations(charges, 2):
         _check_apart(where, first, second)
     return tuple(charges)

@@ -7,9 +7,7 @@ import numpy as np
 import warp as wp
 
 from warp_mpm.config import Order, ShapeFunction, SolverConfig, Transfer
-from warp_mpm.detonators import PlaneDetonator, PointDetonator
 from warp_mpm.kernels import shape, strain, walls
-from warp_mpm.kernels.arrival import Ignition
 from warp_mpm.kernels.motion import Faces
 from warp_mpm.kernels.order import Slabs
 from warp_mpm.kernels.precision import vector3
@@ -45,7 +43,6 @@ class ChargeModel:
     burn_record: Any  # 0 for inert matter
     unreacted_record: Any  # 0 where unburnt matter has no pressure
     half_width: float  # of a particle [cells]
-    ignitions: tuple[Ignition, ...]
 
     @property
     def eos_class(self) -> type:
@@ -163,19 +160,7 @@ def _charge_model(scene: Scene, charge: Charge, burn_width: float) -> ChargeMode
         burn_record=0 if burn is None else burn.record(burn_width, spacing),
         unreacted_record=0 if unreacted is None else unreacted.record(),
         half_width=0.5 / charge.particles_per_axis,
-        ignitions=tuple(_ignition(scene, d, spacing) for d in scene.detonators if charge.name in d.charges),
     )
-
-
-def _ignition(scene: Scene, detonator: PointDetonator | PlaneDetonator, spacing: float) -> Ignition:
-    ignition = Ignition()
-    ignition.position = vector3(*np.subtract(detonator.position, scene.domain.lower))
-    ignition.time = detonator.time
-    if isinstance(detonator, PlaneDetonator):
-        ignition.normal = vector3(*(np.array(detonator.normal) / np.linalg.norm(detonator.normal)))
-    elif detonator.booster:
-        ignition.booster_radius = spacing
-    return ignition
 
 
 def _boundary(scene: Scene) -> walls.Boundary:

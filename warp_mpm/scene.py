@@ -88,6 +88,7 @@ class Charge:
     volume_tolerance: float  # relative; 0 when the volume is exact
     particles_per_axis: int = 2  # along each axis of every cell
     velocities: np.ndarray | None = None  # (n, 3) float64, initial [m/s]; None: at rest
+    may_stay_unlit: bool = False  # an explosive to which no detonation needs to come
 
     @property
     def particle_volume(self) -> float:

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warp_mpm.kernels import arrival, grid, order
+from warp_mpm.arrival_times import light_particles
+from warp_mpm.kernels import grid, order
 from warp_mpm.kernels.blocks import EDGE, NODES
 from warp_mpm.kernels.precision import LAST_FRACTION, NEVER, matrix3, scalar, vector2, vector3, vector4, vector8
 from warp_mpm.kernels.records import (
@@ -68,7 +69,7 @@ class State:
         # Twice the count: the sort uses the second half as its scratch.
         self._keys = wp.zeros(2 * self.count, dtype=wp.int64, device=self.device)
         self._order = wp.zeros(2 * self.count, dtype=int, device=self.device)
-        self._light()
+        light_particles(model.scene, self.particles, self.grid, self.device)
         self.sorts = 0
         self.ranges = self.sort()
 
@@ -175,21 +176,6 @@ class State:
         values = nodal.numpy()
         shape = tuple(n + 3 for n in self.model.scene.domain.cells)
         return values[: np.prod(shape)].reshape(shape + values.shape[1:])[1:-1, 1:-1, 1:-1]
-
-    def _light(self) -> None:
-        """Set arrival and booster times from the detonators; particles are in creation order here."""
-        begin = 0
-        for charge_model, charge in zip(self.model.charges, self.model.scene.charges, strict=True):
-            count = len(charge.positions)
-            if charge_model.ignitions and charge.material.burn is not None:
-                ignitions: wp.array = wp.array(list(charge_model.ignitions), dtype=arrival.Ignition, device=self.device)
-                wp.launch(
-                    arrival.light,
-                    count,
-                    inputs=[self.particles, self.grid, ignitions, charge.material.burn.detonation_speed, begin],
-                    device=self.device,
-                )
-            begin += count
 
 
 def memory_needed(model: Model) -> int:

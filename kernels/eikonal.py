@@ -1,0 +1,365 @@
+"""Arrival times of a detonation around obstacles and through several explosives: |grad t_b| = 1 / D(x).
+
+The front runs along straight ways that turn where they enter another medium and around the edges of what carries no
+wave. So each node (a cell's centre, for each medium) carries no bare time but the *route* of its wave: the last corner
+and the one before it. A neighbour's route goes on to a node by moving its last corner to where it is best for this
+node, or by adding a corner; the earliest one stays. Times are therefore exact along straight ways from a detonator,
+from a corner and through an interface, and |grad t_b| is 1 / D there, however coarse the grid is; around curved
+obstacles the way is a polygon whose edges cut it no deeper than a small tolerance.
+
+Nodes are settled in the order of their times, a window at a time, as in the group marching method: a wave comes to a
+node from nodes that are settled already, so none is ever computed anew, and the outcome does not depend on the order of
+the threads.
+
+References: J. A. Sethian, Fast marching methods, SIAM Review 41 (1999) 199; S. Kim, An O(N) level set method for
+eikonal equations, SIAM J. Sci. Comput. 22 (2001) 2178 (group marching); A. Nash, K. Daniel, S. Koenig, A. Felner,
+Theta*: any-angle path planning on grids, AAAI (2007) 1177 (ways that go on from a parent in sight).
+"""
+
+import warp as wp
+
+from warp_mpm.kernels.arrival import (
+    Ignition,
+    arrival_time,
+    boost,
+    particle_position,
+    source_of,
+    source_time,
+)
+from warp_mpm.kernels.passage import (
+    Passage,
+    best_corner,
+    corner_between,
+    distance_at,
+    is_clear,
+    onto_surface,
+)
+from warp_mpm.kernels.precision import HALF, NEVER, ONE, ZERO, scalar, vector3
+from warp_mpm.kernels.records import Grid, Particles
+
+FIXED = wp.constant(-1)  # the medium before a corner that does not move any more
+ABSENT = wp.constant(-2)  # a node outside its medium
+OPEN = wp.constant(-1)  # a node not yet settled; settled ones have the number of their window
+MOST_CORNERS = wp.constant(12)  # between two neighbouring nodes
+MARGIN = wp.constant(scalar(0.3))  # of a cell: what moving a corner may gain between neighbours
+
+
+@wp.struct
+class Route:
+    """The end of a wave's way: ... start - corner - here, straight in between."""
+
+    time: scalar  # of arrival [s]
+    corner: vector3  # from which the wave comes straight [m]
+    corner_time: scalar  # when it was there [s]
+    start: vector3  # from which it came to the corner [m]
+    start_time: scalar  # [s]
+    medium: int  # between start and corner; FIXED: the corner is a detonator, or stays where it is
+    direct: int  # 1: the corner is a detonator
+
+
+@wp.struct
+class Nodes:
+    """For each medium one node a cell of a box of cells: its centre, or a place of the medium near by."""
+
+    place: wp.array(dtype=vector3)  # relative to the domain's lower corner [m]
+    route: wp.array(dtype=Route)
+    window: wp.array(dtype=int)  # in which it was settled, or OPEN, or ABSENT
+    touched: wp.array(dtype=int)  # window in which a neighbour was settled
+    certain: wp.array(dtype=int)  # 1: no wave can come earlier than the straight one it has
+    first: wp.vec3i  # cell of the box's lower corner
+    cells: wp.vec3i  # of the box per axis
+    count: int  # of cells
+    media: int
+    spacing: vector3  # of the cells [m]
+    size: scalar  # of the smallest side of a cell [m]
+
+
+@wp.func
+def no_route() -> Route:
+    """Nothing has come."""
+    route = Route()
+    route.time = NEVER
+    route.medium = FIXED
+    return route
+
+
+@wp.func
+def route_from(corner: vector3, corner_time: scalar, speed: scalar, place: vector3) -> Route:
+    """A straight way from a corner that stays where it is."""
+    route = Route()
+    route.corner = corner
+    route.corner_time = corner_time
+    route.time = corner_time + wp.length(place - corner) / speed
+    route.medium = FIXED
+    return route
+
+
+@wp.func
+def route_over(
+    passage: Passage, start: vector3, start_time: scalar, before: int, corner: vector3, place: vector3, medium: int
+) -> Route:
+    """The way from a start through a medium to a corner, on through another one to a place, if it is clear."""
+    route = no_route()
+    if is_clear(passage, before, start, corner) and is_clear(passage, medium, corner, place):
+        time = start_time + wp.length(corner - start) / passage.speed[before]
+        route = route_from(corner, time, passage.speed[medium], place)
+        route.start = start
+        route.start_time = start_time
+        route.medium = before
+    return route
+
+
+@wp.func
+def moved_on(passage: Passage, known: Route, place: vector3, medium: int) -> Route:
+    """A node's route, its last corner moved to suit another place of the same medium; none if that is not clear."""
+    if known.medium == medium and is_clear(passage, medium, known.start, place):
+        return route_from(known.start, known.start_time, passage.speed[medium], place)
+    corner = best_corner(
+        passage,
+        known.medium,
+        known.start,
+        ONE / passage.speed[known.medium],
+        known.corner,
+        place,
+        ONE / passage.speed[medium],
+    )
+    return route_over(passage, known.start, known.start_time, known.medium, corner, place, medium)
+
+
+@wp.func
+def around(passage: Passage, known: Route, place: vector3, medium: int) -> Route:
+    """A node's route, its last corner kept: straight on to a place of the same medium, or around what is between."""
+    speed = passage.speed[medium]
+    start = known.corner + vector3()
+    start_time = known.corner_time + ZERO
+    corner = known.corner + vector3()
+    corner_time = known.corner_time + ZERO
+    corners = wp.int32(0)
+    while corners < MOST_CORNERS:
+        if is_clear(passage, medium, corner, place):
+            break
+        following = corner_between(passage, medium, corner, place)
+        if corners == 0 or not is_clear(passage, medium, start, following):
+            start = corner
+            start_time = corner_time
+        corner = following
+        corner_time = start_time + wp.length(corner - start) / speed
+        corners = corners + 1
+    route = no_route()
+    if corners == 0:
+        route = route_from(corner, corner_time, speed, place)
+    elif corners < MOST_CORNERS:
+        best = best_corner(passage, medium, start, ONE / speed, corner, place, ONE / speed)
+        route = route_over(passage, start, start_time, medium, best, place, medium)
+        if route.time >= NEVER:
+            route = route_over(passage, start, start_time, medium, corner, place, medium)
+    return route
+
+
+@wp.func
+def across(passage: Passage, known: Route, node: vector3, before: int, place: vector3, medium: int) -> Route:
+    """A node's route, its last corner kept, on to a place in another medium: refracted at the surface between."""
+    inside = wp.min(distance_at(passage, before, node), ZERO)
+    outside = wp.max(distance_at(passage, before, place), ZERO)
+    corner = node
+    if outside - inside > ZERO:
+        corner = node + (place - node) * (inside / (inside - outside))
+    corner = onto_surface(passage, before, corner)
+    corner = best_corner(
+        passage,
+        before,
+        known.corner,
+        ONE / passage.speed[before],
+        corner,
+        place,
+        ONE / passage.speed[medium],
+    )
+    return route_over(passage, known.corner, known.corner_time, before, corner, place, medium)
+
+
+@wp.func
+def onward(passage: Passage, known: Route, node: vector3, before: int, place: vector3, medium: int) -> Route:
+    """The route of a node in one medium, led on to a place near by in the same or another medium."""
+    if medium != before:
+        return across(passage, known, node, before, place, medium)
+    route = no_route()
+    if known.medium != FIXED:
+        route = moved_on(passage, known, place, medium)
+    if route.time >= NEVER:
+        route = around(passage, known, place, medium)
+    return route
+
+
+@wp.func
+def straight_route(passage: Passage, ignitions: wp.array(dtype=Ignition), medium: int, place: vector3) -> Route:
+    """The first of the straight waves that nothing hinders; `direct` is 2 if those that are hindered come later."""
+    speed = passage.speed[medium]
+    best = no_route()
+    hindered = scalar(1.0e30)
+    for n in range(ignitions.shape[0]):
+        ignition = ignitions[n]
+        time = arrival_time(ignition, place, speed)
+        if time < best.time:
+            source = source_of(ignition, place, speed)
+            if is_clear(passage, medium, source, place):
+                best.time = time
+                best.corner = source
+                best.corner_time = source_time(ignition, place, speed)
+                best.direct = 1
+            else:
+                hindered = wp.min(hindered, time)
+    if best.time <= hindered and best.time < NEVER:
+        best.direct = 2
+    return best
+
+
+@wp.func
+def cell_of(nodes: Nodes, index: int) -> wp.vec3i:
+    """A cell of the box by its flat index."""
+    layer = nodes.cells[1] * nodes.cells[2]
+    i = index / layer
+    rest = index - i * layer
+    j = rest / nodes.cells[2]
+    return wp.vec3i(i, j, rest - j * nodes.cells[2])
+
+
+@wp.func
+def node_near(nodes: Nodes, cell: wp.vec3i, neighbour: int, medium: int) -> int:
+    """Flat index of the node of one of the 27 cells around a cell, itself the first; -1 beyond the box."""
+    number = (neighbour + 13) % 27
+    i = cell[0] + number / 9 - 1
+    j = cell[1] + (number / 3) % 3 - 1
+    k = cell[2] + number % 3 - 1
+    if i < 0 or j < 0 or k < 0 or i >= nodes.cells[0] or j >= nodes.cells[1] or k >= nodes.cells[2]:
+        return -1
+    return medium * nodes.count + (i * nodes.cells[1] + j) * nodes.cells[2] + k
+
+
+@wp.kernel(enable_backward=False)
+def place_nodes(passage: Passage, nodes: Nodes):
+    """Put the nodes into their media."""
+    medium, index = wp.tid()
+    cell = cell_of(nodes, index)
+    whole = vector3(
+        scalar(nodes.first[0] + cell[0]), scalar(nodes.first[1] + cell[1]), scalar(nodes.first[2] + cell[2])
+    )
+    centre = wp.cw_mul(whole + vector3(HALF, HALF, HALF), nodes.spacing)
+    place = centre
+    if distance_at(passage, medium, centre) > ZERO:
+        place = onto_surface(passage, medium, centre)
+    n = medium * nodes.count + index
+    shift = wp.cw_div(place - centre, nodes.spacing)
+    farthest = wp.max(wp.max(wp.abs(shift[0]), wp.abs(shift[1])), wp.abs(shift[2]))
+    nodes.place[n] = place
+    nodes.window[n] = ABSENT
+    if farthest <= HALF and distance_at(passage, medium, place) <= passage.tolerance:
+        nodes.window[n] = OPEN
+
+
+@wp.kernel(enable_backward=False)
+def light_nodes(passage: Passage, nodes: Nodes, medium: int, ignitions: wp.array(dtype=Ignition)):
+    """Give the nodes of a medium the straight waves of its detonators."""
+    n = medium * nodes.count + wp.tid()
+    if nodes.window[n] == OPEN:
+        route = straight_route(passage, ignitions, medium, nodes.place[n])
+        nodes.route[n] = route
+        if route.direct == 2 and nodes.media == 1:
+            nodes.certain[n] = 1
+
+
+@wp.kernel(enable_backward=False)
+def settle(nodes: Nodes, open: wp.array(dtype=int), window: int, end: scalar):
+    """Settle the nodes whose waves come before the end of a window, and touch their neighbours."""
+    n = open[wp.tid()]
+    if nodes.window[n] != OPEN or nodes.route[n].time >= end:
+        return
+    nodes.window[n] = window
+    medium = n / nodes.count
+    cell = cell_of(nodes, n - medium * nodes.count)
+    for other in range(nodes.media):
+        for neighbour in range(27):
+            near = node_near(nodes, cell, neighbour, other)
+            if near >= 0:
+                nodes.touched[near] = window
+
+
+@wp.kernel(enable_backward=False)
+def spread(passage: Passage, nodes: Nodes, open: wp.array(dtype=int), window: int):
+    """Lead the waves of the nodes settled in a window on to their neighbours."""
+    n = open[wp.tid()]
+    if nodes.touched[n] != window or nodes.window[n] != OPEN or nodes.certain[n] == 1:
+        return
+    medium = n / nodes.count
+    place = nodes.place[n]
+    cell = cell_of(nodes, n - medium * nodes.count)
+    best = nodes.route[n]
+    for other in range(nodes.media):
+        for neighbour in range(27):
+            near = node_near(nodes, cell, neighbour, other)
+            if near < 0:
+                continue
+            if nodes.window[near] != window:
+                continue
+            known = nodes.route[near]
+            if may_come_first(passage, nodes, known, other, place, medium, best.time):
+                route = onward(passage, known, nodes.place[near], other, place, medium)
+                if route.time < best.time:
+                    best = route
+    nodes.route[n] = best
+
+
+@wp.func
+def may_come_first(
+    passage: Passage, nodes: Nodes, known: Route, before: int, place: vector3, medium: int, time: scalar
+) -> bool:
+    """Whether a neighbour's route can come to a place before a time: only then it is worth to lead it on."""
+    if medium != before:
+        return known.time < time
+    speed = passage.speed[medium]
+    straight = known.corner_time + wp.length(place - known.corner) / speed
+    return straight < time + MARGIN * nodes.size / speed
+
+
+@wp.kernel(enable_backward=False)
+def light_around(
+    particles: Particles,
+    grid: Grid,
+    passage: Passage,
+    nodes: Nodes,
+    ignitions: wp.array(dtype=Ignition),
+    medium: int,
+    begin: int,
+):
+    """Arrival times of particles of a medium: straight from a detonator in sight, else over the routes of the nodes."""
+    p = begin + wp.tid()
+    place = particle_position(particles, grid, p)
+    best = straight_route(passage, ignitions, medium, place)
+    if best.direct < 2 or nodes.media > 1:
+        cell = wp.vec3i(
+            int(particles.position[p].cell[0]) - nodes.first[0],
+            int(particles.position[p].cell[1]) - nodes.first[1],
+            int(particles.position[p].cell[2]) - nodes.first[2],
+        )
+        for neighbour in range(27):
+            near = node_near(nodes, cell, neighbour, medium)
+            if near < 0:
+                continue
+            known = nodes.route[near]
+            if nodes.window[near] == ABSENT or known.time >= NEVER:
+                continue
+            if known.direct > 0 and best.direct == 2:
+                continue
+            if may_come_first(passage, nodes, known, medium, place, medium, best.time):
+                route = onward(passage, known, nodes.place[near], medium, place, medium)
+                if route.time < best.time:
+                    best = route
+    particles.burn_times[p].arrival_time = wp.min(particles.burn_times[p].arrival_time, best.time)
+    boost(particles, p, ignitions, place)
+
+
+@wp.kernel(enable_backward=False)
+def find_next(nodes: Nodes, open: wp.array(dtype=int), next: wp.array(dtype=scalar)):
+    """The earliest time of a node not yet settled to which a wave has come."""
+    n = open[wp.tid()]
+    if nodes.window[n] == OPEN and nodes.route[n].time < next[0]:
+        wp.atomic_min(next, 0, nodes.route[n].time)

@@ -1,0 +1,202 @@
+"""Where a detonation can run: the media, bodies of explosive of one detonation speed each, and ways through them.
+
+A medium is known by its signed distance (negative inside) on a lattice finer than the grid. A straight way through a
+medium is clear if it nowhere leaves it by more than a tolerance. A way with one corner is shortest in time when the
+corner, on the surface of a medium, makes the time stationary: that is Snell's law where the way enters another medium
+(Fermat), and a taut string where it goes around an obstacle.
+"""
+
+import warp as wp
+
+from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, scalar, vector2, vector3
+
+CAUTION = wp.constant(scalar(0.8))  # of the distance to a surface that is stepped over; interpolated ones are inexact
+NEWTON_STEPS = wp.constant(4)
+HALVINGS = wp.constant(8)
+FLAT = wp.constant(scalar(1.0e-6))  # of a slope or a determinant that counts as 0
+LOWEST = wp.constant(scalar(-1.0e30))
+
+
+@wp.struct
+class Passage:
+    """The media."""
+
+    distance: wp.array(dtype=scalar)  # signed, of each medium at all lattice points, z fastest [m]
+    speed: wp.array(dtype=scalar)  # of the detonation in each medium [m/s]
+    points: wp.vec3i  # of the lattice per axis
+    count: int  # of them all
+    lower: vector3  # first lattice point, relative to the domain's lower corner [m]
+    spacing: vector3  # of the lattice [m]
+    inverse_spacing: vector3  # [1/m]
+    step: scalar  # smallest step of the search along a line [m]
+    reach: scalar  # a way may begin this far outside its medium [m]
+    tolerance: scalar  # how deep a clear way may cut what is no part of the medium [m]
+
+
+@wp.func
+def distance_at(passage: Passage, medium: int, place: vector3) -> scalar:
+    """Signed distance of a place to a medium [m], linear between lattice points, constant beyond them."""
+    at = wp.cw_mul(place - passage.lower, passage.inverse_spacing)
+    i = wp.clamp(int(wp.floor(at[0])), 0, passage.points[0] - 2)
+    j = wp.clamp(int(wp.floor(at[1])), 0, passage.points[1] - 2)
+    k = wp.clamp(int(wp.floor(at[2])), 0, passage.points[2] - 2)
+    x = wp.clamp(at[0] - scalar(i), ZERO, ONE)
+    y = wp.clamp(at[1] - scalar(j), ZERO, ONE)
+    z = wp.clamp(at[2] - scalar(k), ZERO, ONE)
+    row = passage.points[2]
+    layer = passage.points[1] * row
+    first = medium * passage.count + i * layer + j * row + k
+    d = passage.distance
+    low = wp.lerp(
+        wp.lerp(d[first], d[first + 1], z),
+        wp.lerp(d[first + row], d[first + row + 1], z),
+        y,
+    )
+    high = wp.lerp(
+        wp.lerp(d[first + layer], d[first + layer + 1], z),
+        wp.lerp(d[first + layer + row], d[first + layer + row + 1], z),
+        y,
+    )
+    return wp.lerp(low, high, x)
+
+
+@wp.func
+def slope_at(passage: Passage, medium: int, place: vector3) -> vector3:
+    """Gradient of the signed distance, by central differences over two lattice spacings."""
+    slope = vector3()
+    for axis in range(3):
+        way = vector3()
+        way[axis] = passage.spacing[axis]
+        ahead = distance_at(passage, medium, place + way)
+        behind = distance_at(passage, medium, place - way)
+        slope[axis] = (ahead - behind) / (TWO * passage.spacing[axis])
+    return slope
+
+
+@wp.func
+def normal_at(passage: Passage, medium: int, place: vector3) -> vector3:
+    """Unit vector out of the medium; zero where it has none."""
+    return wp.normalize(slope_at(passage, medium, place))
+
+
+@wp.func
+def onto_surface(passage: Passage, medium: int, place: vector3) -> vector3:
+    """The place, moved along the gradient onto the surface of a medium (Newton's method)."""
+    moved = place
+    for _ in range(NEWTON_STEPS):
+        slope = slope_at(passage, medium, moved)
+        square = wp.dot(slope, slope)
+        if square > FLAT:
+            moved -= slope * (distance_at(passage, medium, moved) / square)
+    return moved
+
+
+@wp.func
+def beginning(passage: Passage, medium: int, place: vector3) -> vector3:
+    """Where a way from a place begins in a medium: a detonator just outside lights what is nearest to it."""
+    distance = distance_at(passage, medium, place)
+    if distance > passage.tolerance and distance <= passage.reach:
+        return onto_surface(passage, medium, place)
+    return place
+
+
+@wp.func
+def deepest(passage: Passage, medium: int, start: vector3, end: vector3, limit: scalar) -> vector2:
+    """How far a straight way leaves the medium at most [m], and after which share of the way.
+
+    Stops where it first leaves it by more than `limit`. Where the surface is far away long steps are taken.
+    """
+    way = end - start
+    length = wp.length(way)
+    worst = scalar(-1.0e30)
+    where = scalar(0.0)
+    gone = scalar(0.0)
+    while gone < length and worst <= limit:
+        distance = distance_at(passage, medium, start + way * (gone / length))
+        if distance > worst:
+            worst = distance
+            where = gone / length
+        gone += wp.max(-CAUTION * distance - passage.step, passage.step)
+    return vector2(worst, where)
+
+
+@wp.func
+def is_clear(passage: Passage, medium: int, start: vector3, end: vector3) -> bool:
+    """Whether the straight way stays in the medium."""
+    begin = beginning(passage, medium, start)
+    return deepest(passage, medium, begin, end, passage.tolerance)[0] <= passage.tolerance
+
+
+@wp.func
+def corner_between(passage: Passage, medium: int, start: vector3, end: vector3) -> vector3:
+    """A point on the surface over which a blocked way has to go, so near that the way from the start to it is clear.
+
+    Where the way is deepest in the obstacle, the nearest point of the surface; or the same for the way to that point.
+    """
+    begin = beginning(passage, medium, start)
+    corner = end
+    for _ in range(HALVINGS):
+        found = deepest(passage, medium, begin, corner, -LOWEST)
+        if found[0] <= passage.tolerance:
+            break
+        corner = onto_surface(passage, medium, begin + (corner - begin) * found[1])
+    return corner
+
+
+@wp.func
+def best_corner(
+    passage: Passage,
+    surface: int,
+    start: vector3,
+    slowness: scalar,
+    corner: vector3,
+    end: vector3,
+    slowness_after: scalar,
+) -> vector3:
+    """The corner, moved along a medium's surface to where the time of the way over it is stationary.
+
+    Newton's method in the tangent plane: with the gradient g of the time, its Hessian H and the surface's unit normal n
+    the second derivative along the surface is H - (g . n) dn/dx.
+    """
+    for _ in range(NEWTON_STEPS):
+        before = corner - start
+        after = end - corner
+        length = wp.length(before)
+        length_after = wp.length(after)
+        if length < passage.step * FLAT or length_after < passage.step * FLAT:
+            break
+        before /= length
+        after /= length_after
+        gradient = before * slowness - after * slowness_after
+        normal = normal_at(passage, surface, corner)
+        first = wp.normalize(before + after - normal * wp.dot(normal, before + after))
+        if wp.dot(first, first) < HALF:
+            break
+        second = wp.cross(normal, first)
+        width = TWO * passage.step
+        turn_first = normal_at(passage, surface, corner + first * width)
+        turn_first = (turn_first - normal_at(passage, surface, corner - first * width)) / (TWO * width)
+        turn_second = normal_at(passage, surface, corner + second * width)
+        turn_second = (turn_second - normal_at(passage, surface, corner - second * width)) / (TWO * width)
+        push = wp.dot(gradient, normal)
+        near = slowness / length
+        far = slowness_after / length_after
+        a = near * (ONE - wp.dot(before, first) ** TWO) + far * (ONE - wp.dot(after, first) ** TWO)
+        a -= push * wp.dot(turn_first, first)
+        b = -near * wp.dot(before, first) * wp.dot(before, second)
+        b -= far * wp.dot(after, first) * wp.dot(after, second)
+        b -= push * HALF * (wp.dot(turn_first, second) + wp.dot(turn_second, first))
+        c = near * (ONE - wp.dot(before, second) ** TWO) + far * (ONE - wp.dot(after, second) ** TWO)
+        c -= push * wp.dot(turn_second, second)
+        along = wp.dot(gradient, first)
+        across = wp.dot(gradient, second)
+        determinant = a * c - b * b
+        scale = (near + far) * (near + far)
+        if wp.abs(determinant) < FLAT * scale:
+            break
+        move = first * ((b * across - c * along) / determinant) + second * ((b * along - a * across) / determinant)
+        far_enough = TWO * passage.step
+        if wp.length(move) > far_enough:
+            move *= far_enough / wp.length(move)
+        corner = onto_surface(passage, surface, corner + move)
+    return corner

@@ -1,0 +1,258 @@
+"""Arrival times of all particles: straight where nothing is in the way, by the eikonal equation elsewhere.
+
+A charge that is convex and touches no other explosive needs no grid. For all others there are *media*, one for each
+detonation speed: the union of its charges, as signed distances on a lattice finer than the grid.
+`kernels/eikonal.py` finds the ways through them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warp_mpm.checks import mistake
+from warp_mpm.geometry import Box, Cylinder, Sphere
+from warp_mpm.ignition import Source, sources_of
+from warp_mpm.kernels import arrival, eikonal
+from warp_mpm.kernels.arrival import Ignition
+from warp_mpm.kernels.passage import Passage
+from warp_mpm.kernels.precision import NEVER, scalar, vector3
+from warp_mpm.kernels.records import Grid, Particles
+from warp_mpm.scene import Charge, Domain, Scene
+
+LATTICE_PER_CELL = 2  # spacings of the lattice a cell: an obstacle of one cell is seen
+LATTICE_MARGIN = 1.5  # of the lattice around the media [cells]
+TOLERANCE = 0.02  # how deep a clear way may cut an obstacle [cells]
+REACH = 0.51  # how far outside its charge a detonator may lie [cells]; half a cell, and round-off
+WINDOW = 0.5  # how far the fastest wave runs while nodes are settled together [cells]
+WINDOWS_AT_ONCE = 8  # between two looks at how far the waves have come
+SAME_SPEED = 1e-6  # relative difference of the speeds of one medium
+CHUNK = 200_000  # lattice points whose distances are computed at a time
+
+
+@dataclass(frozen=True)
+class Explosive:
+    """A charge that burns, and what lights it."""
+
+    charge: Charge
+    speed: float  # of the detonation [m/s]
+    begin: int  # its first particle
+    near: tuple[Ignition, ...]  # detonators in it, or within half a cell
+    remote: tuple[Ignition, ...]  # detonators elsewhere that name it: their waves run straight, whatever lies between
+
+
+@dataclass(frozen=True)
+class Medium:
+    """Explosives of one detonation speed, lit by what lights any of them."""
+
+    explosives: tuple[Explosive, ...]
+
+    @property
+    def speed(self) -> float:
+        """Of the detonation [m/s]."""
+        return self.explosives[0].speed
+
+    @property
+    def ignitions(self) -> list[Ignition]:
+        """All that are in it."""
+        return [ignition for explosive in self.explosives for ignition in explosive.near]
+
+    def signed_distance(self, points: np.ndarray) -> np.ndarray:
+        """Of points (n, 3) [m] to its surface (n,) [m], negative inside."""
+        return np.min([explosive.charge.solid.signed_distance(points) for explosive in self.explosives], axis=0)
+
+
+def light_particles(scene: Scene, particles: Particles, grid: Grid, device: wp.Device) -> None:
+    """Set the arrival and booster times of particles that are in creation order.
+
+    Args:
+        scene: the charges and what lights them.
+        particles: whose `burn_times` are set; before, they are never.
+        grid: the cells.
+        device: where they are.
+
+    Raises:
+        InputError: no wave comes to an explosive that may not stay unlit.
+    """
+    explosives = _explosives(scene)
+    hindered = [one for one in explosives if not _is_open(one, explosives, max(scene.domain.spacing))]
+    for explosive in explosives:
+        straight = explosive.remote if explosive in hindered else explosive.near + explosive.remote
+        if straight:
+            inputs = [particles, grid, _array(straight, Ignition, device), explosive.speed, explosive.begin]
+            wp.launch(arrival.light, len(explosive.charge.positions), inputs=inputs, device=device)
+    if hindered:
+        _light_around(scene, _media(hindered), particles, grid, device)
+    _check_reached(scene, explosives, particles)
+
+
+def _explosives(scene: Scene) -> list[Explosive]:
+    """The charges that burn."""
+    found, begin = [], 0
+    spacing = max(scene.domain.spacing)
+    for charge in scene.charges:
+        if charge.material.burn is not None:
+            near, remote = sources_of(scene.detonators, charge, spacing)
+            ignitions = (tuple(_ignition(scene.domain, source, spacing) for source in part) for part in (near, remote))
+            found.append(Explosive(charge, charge.material.burn.detonation_speed, begin, *ignitions))
+        begin += len(charge.positions)
+    return found
+
+
+def _ignition(domain: Domain, source: Source, booster_radius: float) -> Ignition:
+    """A source as the kernels take it."""
+    ignition = Ignition()
+    ignition.position = vector3(*(np.array(source.position) - domain.lower))
+    ignition.along = vector3(*source.along)
+    ignition.normal = vector3(*source.normal)
+    ignition.radius = source.radius
+    ignition.time = source.time
+    ignition.delay = source.delay
+    ignition.booster_radius = booster_radius if source.booster else 0.0
+    return ignition
+
+
+def _is_open(explosive: Explosive, explosives: Sequence[Explosive], cell: float) -> bool:
+    """Whether nothing can be in the way: it is convex, and no other explosive comes within a cell [m]."""
+    if not isinstance(explosive.charge.solid, Box | Cylinder | Sphere):
+        return False
+    lower, upper = explosive.charge.solid.bounds()
+    others = [one.charge.solid.bounds() for one in explosives if one is not explosive]
+    return all(np.any(low > upper + cell) or np.any(high < lower - cell) for low, high in others)
+
+
+def _media(explosives: Sequence[Explosive]) -> list[Medium]:
+    """The explosives by their speeds."""
+    by_speed: list[list[Explosive]] = []
+    for explosive in sorted(explosives, key=lambda one: one.speed):
+        if by_speed and explosive.speed <= by_speed[-1][0].speed * (1.0 + SAME_SPEED):
+            by_speed[-1].append(explosive)
+        else:
+            by_speed.append([explosive])
+    return [Medium(tuple(group)) for group in by_speed]
+
+
+def _light_around(scene: Scene, media: Sequence[Medium], particles: Particles, grid: Grid, device: wp.Device) -> None:
+    """Arrival times where the waves have to go around something or through several explosives."""
+    passage = _passage(scene.domain, media, device)
+    nodes = _nodes(scene.domain, media, device)
+    wp.launch(eikonal.place_nodes, (len(media), nodes.count), inputs=[passage, nodes], device=device)
+    ignitions = [_array(medium.ignitions, Ignition, device) for medium in media]
+    for number, lit_by in enumerate(ignitions):
+        wp.launch(eikonal.light_nodes, nodes.count, inputs=[passage, nodes, number, lit_by], device=device)
+    _run_waves(passage, nodes, max(medium.speed for medium in media), device)
+    for number, medium in enumerate(media):
+        for explosive in medium.explosives:
+            inputs = [particles, grid, passage, nodes, ignitions[number], number, explosive.begin]
+            wp.launch(eikonal.light_around, len(explosive.charge.positions), inputs=inputs, device=device)
+
+
+def _run_waves(passage: Passage, nodes: eikonal.Nodes, fastest: float, device: wp.Device) -> None:
+    """Settle all nodes to which a wave comes, in the order of their times."""
+    open_nodes = _array(_open_nodes(nodes), int, device)
+    duration = WINDOW * float(nodes.size) / fastest
+    window, end = 0, 0.0
+    following = wp.zeros(1, dtype=scalar, device=device)
+    while True:
+        following.fill_(NEVER)
+        wp.launch(eikonal.find_next, len(open_nodes), inputs=[nodes, open_nodes, following], device=device)
+        earliest = float(following.numpy()[0])
+        if earliest >= float(NEVER):
+            return
+        end = max(end, earliest)
+        for _ in range(WINDOWS_AT_ONCE):
+            end += duration
+            window += 1
+            wp.launch(eikonal.settle, len(open_nodes), inputs=[nodes, open_nodes, window, end], device=device)
+            wp.launch(eikonal.spread, len(open_nodes), inputs=[passage, nodes, open_nodes, window], device=device)
+
+
+def _open_nodes(nodes: eikonal.Nodes) -> np.ndarray:
+    """Indices of the nodes whose times are not certain, and of their neighbors (n,)."""
+    shape = (nodes.media, *nodes.cells)
+    present = (nodes.window.numpy() != int(eikonal.ABSENT)).reshape(shape)
+    wanted = present & (nodes.certain.numpy() == 0).reshape(shape)
+    near = wanted.any(axis=0)
+    for axis in range(3):
+        near = np.moveaxis(near, axis, 0)
+        spread = near.copy()
+        spread[1:] |= near[:-1]
+        spread[:-1] |= near[1:]
+        near = np.moveaxis(spread, 0, axis)
+    return np.flatnonzero(present & near).astype(np.int32)
+
+
+def _bounds(media: Sequence[Medium]) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner of the box around all of them, (3,) each [m]."""
+    boxes = np.array([one.charge.solid.bounds() for medium in media for one in medium.explosives])
+    return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+
+
+def _passage(domain: Domain, media: Sequence[Medium], device: wp.Device) -> Passage:
+    """The media, measured on the lattice."""
+    cell = np.array(domain.spacing)
+    spacing = cell / LATTICE_PER_CELL
+    lower, upper = _bounds(media)
+    first = np.floor((lower - domain.lower) / cell - LATTICE_MARGIN) * LATTICE_PER_CELL  # lattice points on faces
+    points = np.ceil((upper - domain.lower) / spacing + LATTICE_MARGIN * LATTICE_PER_CELL - first).astype(int) + 1
+    axes = [domain.lower[n] + (first[n] + np.arange(points[n])) * spacing[n] for n in range(3)]
+    layers = max(1, CHUNK // int(points[1] * points[2]))
+    distance = [
+        medium.signed_distance(np.stack(np.meshgrid(part, axes[1], axes[2], indexing="ij"), axis=-1).reshape(-1, 3))
+        for medium in media
+        for part in np.split(axes[0], range(layers, points[0], layers))
+    ]
+    passage = Passage()
+    passage.distance = wp.array(np.concatenate(distance), dtype=scalar, device=device)
+    passage.speed = wp.array([medium.speed for medium in media], dtype=scalar, device=device)
+    passage.points = wp.vec3i(*(int(n) for n in points))
+    passage.count = int(np.prod(points))
+    passage.lower = vector3(*(first * spacing))
+    passage.spacing = vector3(*spacing)
+    passage.inverse_spacing = vector3(*(1.0 / spacing))
+    passage.step = float(spacing.min()) / 2.0
+    passage.reach = REACH * float(cell.max())
+    passage.tolerance = TOLERANCE * float(cell.min())
+    return passage
+
+
+def _nodes(domain: Domain, media: Sequence[Medium], device: wp.Device) -> eikonal.Nodes:
+    """Nodes without places and waves, in a box of cells around the media."""
+    cell = np.array(domain.spacing)
+    lower, upper = ((corner - domain.lower) / cell for corner in _bounds(media))
+    first = np.clip(np.floor(lower) - 1, 0, domain.cells).astype(int)
+    cells = np.clip(np.ceil(upper) + 1, 0, domain.cells).astype(int) - first
+    nodes = eikonal.Nodes()
+    nodes.first, nodes.cells = (wp.vec3i(*(int(n) for n in numbers)) for numbers in (first, cells))
+    nodes.count, nodes.media = int(np.prod(cells)), len(media)
+    nodes.spacing, nodes.size = vector3(*cell), float(cell.min())
+    total = nodes.count * nodes.media
+    nodes.place = wp.zeros(total, dtype=vector3, device=device)
+    nodes.route = wp.zeros(total, dtype=eikonal.Route, device=device)
+    nodes.window = wp.zeros(total, dtype=int, device=device)
+    nodes.touched = wp.zeros(total, dtype=int, device=device)
+    nodes.certain = wp.zeros(total, dtype=int, device=device)
+    return nodes
+
+
+def _check_reached(scene: Scene, explosives: Sequence[Explosive], particles: Particles) -> None:
+    """Refuse explosive that no wave comes to, unless it may stay unlit."""
+    if not explosives:
+        return
+    times = particles.burn_times.numpy()["arrival_time"]
+    for explosive in explosives:
+        charge = explosive.charge
+        unlit = times[explosive.begin : explosive.begin + len(charge.positions)] >= float(NEVER)
+        if unlit.any() and not charge.may_stay_unlit:
+            x, y, z = charge.positions[np.argmax(unlit)]
+            raise mistake(
+                f"scene {scene.name}: charge {charge.name!r}",
+                "a detonation wave that comes to all of it",
+                f"none at {unlit.sum()} of its {len(unlit)} particles, the first at ({x:g}, {y:g}, {z:g}) m",
+                "put a detonator there, or set may_stay_unlit",
+            )
+
+
+def _array(values: Sequence[object] | np.ndarray, dtype: type, device: wp.Device) -> wp.array:
+    return wp.array(values, dtype=dtype, device=device) if len(values) else wp.zeros(0, dtype=dtype, device=device)
