@@ -34,13 +34,16 @@ from warp_mpm.kernels.passage import (
     is_clear,
     onto_surface,
 )
-from warp_mpm.kernels.precision import HALF, NEVER, ONE, ZERO, scalar, vector3
+from warp_mpm.kernels.precision import HALF, NEVER, ONE, TWO, ZERO, scalar, vector3
 from warp_mpm.kernels.records import Grid, Particles
 
 FIXED = wp.constant(-1)  # the medium before a corner that does not move any more
 ABSENT = wp.constant(-2)  # a node outside its medium
 OPEN = wp.constant(-1)  # a node not yet settled; settled ones have the number of their window
 MOST_CORNERS = wp.constant(12)  # between two neighbouring nodes
+ALIKE = wp.constant(scalar(1.0e-3))  # of a cell: places that are the same
+NEGLIGIBLE = wp.constant(scalar(2.0e-4))  # of a cell: a gain that is not worth its computation
+SMALL = wp.constant(scalar(0.004))  # of a cell: a gain that second order is good enough for
 MARGIN = wp.constant(scalar(0.3))  # of a cell: what moving a corner may gain between neighbours
 
 
@@ -149,10 +152,11 @@ def around(passage: Passage, known: Route, place: vector3, medium: int) -> Route
     if corners == 0:
         route = route_from(corner, corner_time, speed, place)
     elif corners < MOST_CORNERS:
+        kept = route_over(passage, start, start_time, medium, corner, place, medium)
         best = best_corner(passage, medium, start, ONE / speed, corner, place, ONE / speed)
         route = route_over(passage, start, start_time, medium, best, place, medium)
-        if route.time >= NEVER:
-            route = route_over(passage, start, start_time, medium, corner, place, medium)
+        if kept.time < route.time:
+            route = kept
     return route
 
 
@@ -191,12 +195,26 @@ def onward(passage: Passage, known: Route, node: vector3, before: int, place: ve
 
 
 @wp.func
-def straight_route(passage: Passage, ignitions: wp.array(dtype=Ignition), medium: int, place: vector3) -> Route:
-    """The first of the straight waves that nothing hinders; `direct` is 2 if those that are hindered come later."""
+def straight_route(
+    passage: Passage, ignitions: wp.array(dtype=Ignition), medium: int, place: vector3, latest: scalar
+) -> Route:
+    """The first of the straight waves that nothing hinders and that come before the latest time of interest.
+
+    Its `direct` is 2 if those that are hindered would come later.
+    """
     speed = passage.speed[medium]
     best = no_route()
-    hindered = scalar(1.0e30)
+    best.time = latest
+    first = wp.int32(0)
+    earliest = scalar(1.0e30)
     for n in range(ignitions.shape[0]):
+        time = arrival_time(ignitions[n], place, speed)
+        if time < earliest:
+            earliest = time
+            first = n
+    hindered = scalar(1.0e30)
+    for count in range(ignitions.shape[0]):
+        n = (first + count) % ignitions.shape[0]  # the first one is seldom hindered, and then the others come too late
         ignition = ignitions[n]
         time = arrival_time(ignition, place, speed)
         if time < best.time:
@@ -208,7 +226,9 @@ def straight_route(passage: Passage, ignitions: wp.array(dtype=Ignition), medium
                 best.direct = 1
             else:
                 hindered = wp.min(hindered, time)
-    if best.time <= hindered and best.time < NEVER:
+    if best.direct == 0:
+        best.time = NEVER
+    elif best.time <= hindered:
         best.direct = 2
     return best
 
@@ -261,7 +281,7 @@ def light_nodes(passage: Passage, nodes: Nodes, medium: int, ignitions: wp.array
     """Give the nodes of a medium the straight waves of its detonators."""
     n = medium * nodes.count + wp.tid()
     if nodes.window[n] == OPEN:
-        route = straight_route(passage, ignitions, medium, nodes.place[n])
+        route = straight_route(passage, ignitions, medium, nodes.place[n], NEVER)
         nodes.route[n] = route
         if route.direct == 2 and nodes.media == 1:
             nodes.certain[n] = 1
@@ -301,7 +321,7 @@ def spread(passage: Passage, nodes: Nodes, open: wp.array(dtype=int), window: in
             if nodes.window[near] != window:
                 continue
             known = nodes.route[near]
-            if may_come_first(passage, nodes, known, other, place, medium, best.time):
+            if may_come_first(passage, nodes, known, other, place, medium, best):
                 route = onward(passage, known, nodes.place[near], other, place, medium)
                 if route.time < best.time:
                     best = route
@@ -309,15 +329,52 @@ def spread(passage: Passage, nodes: Nodes, open: wp.array(dtype=int), window: in
 
 
 @wp.func
+def expected_gain(passage: Passage, known: Route, node: vector3, place: vector3, medium: int) -> scalar:
+    """What moving the corner of a node's route to suit a place near by gains in time, to second order [s].
+
+    With g the part of the time's gradient along the surface, and H the second derivative along g, it is g^2 / (2 H).
+    The surface's normal is that of the gradient at the node, where the corner is best.
+    """
+    gain = scalar(0.0)
+    if known.medium != FIXED:
+        slowness = ONE / passage.speed[known.medium]
+        slowness_after = ONE / passage.speed[medium]
+        before = known.corner - known.start
+        after = place - known.corner
+        length = wp.length(before)
+        length_after = wp.length(after)
+        if length > ZERO and length_after > ZERO:
+            before /= length
+            after /= length_after
+            normal = wp.normalize(before * slowness - wp.normalize(node - known.corner) * slowness_after)
+            gradient = before * slowness - after * slowness_after
+            gradient -= normal * wp.dot(normal, gradient)
+            way = wp.normalize(gradient)
+            second = slowness / length * (ONE - wp.dot(before, way) ** TWO)
+            second += slowness_after / length_after * (ONE - wp.dot(after, way) ** TWO)
+            if second > ZERO:
+                gain = wp.dot(gradient, gradient) / (TWO * second)
+    return gain
+
+
+@wp.func
 def may_come_first(
-    passage: Passage, nodes: Nodes, known: Route, before: int, place: vector3, medium: int, time: scalar
+    passage: Passage, nodes: Nodes, known: Route, before: int, place: vector3, medium: int, best: Route
 ) -> bool:
-    """Whether a neighbour's route can come to a place before a time: only then it is worth to lead it on."""
+    """Whether a neighbour's route can come to a place before the best one known: only then it is worth to lead it on.
+
+    Routes from the same start over the same corner differ in nothing but how far the corner has been moved.
+    """
     if medium != before:
-        return known.time < time
+        return known.time < best.time
+    if known.medium != FIXED and known.medium == best.medium:
+        alike = wp.length(known.start - best.start) < ALIKE * nodes.size
+        if alike and wp.length(known.corner - best.corner) < TWO * nodes.size:
+            return False
     speed = passage.speed[medium]
     straight = known.corner_time + wp.length(place - known.corner) / speed
-    return straight < time + MARGIN * nodes.size / speed
+    gain = wp.where(known.medium == FIXED, -NEGLIGIBLE, MARGIN)
+    return straight < best.time + gain * nodes.size / speed
 
 
 @wp.kernel(enable_backward=False)
@@ -333,13 +390,18 @@ def light_around(
     """Arrival times of particles of a medium: straight from a detonator in sight, else over the routes of the nodes."""
     p = begin + wp.tid()
     place = particle_position(particles, grid, p)
-    best = straight_route(passage, ignitions, medium, place)
+    cell = wp.vec3i(
+        int(particles.position[p].cell[0]) - nodes.first[0],
+        int(particles.position[p].cell[1]) - nodes.first[1],
+        int(particles.position[p].cell[2]) - nodes.first[2],
+    )
+    own = node_near(nodes, cell, 0, medium)
+    latest = NEVER
+    if own >= 0:
+        if nodes.window[own] != ABSENT:
+            latest = nodes.route[own].time + TWO * nodes.size / passage.speed[medium]
+    best = straight_route(passage, ignitions, medium, place, latest)
     if best.direct < 2 or nodes.media > 1:
-        cell = wp.vec3i(
-            int(particles.position[p].cell[0]) - nodes.first[0],
-            int(particles.position[p].cell[1]) - nodes.first[1],
-            int(particles.position[p].cell[2]) - nodes.first[2],
-        )
         for neighbour in range(27):
             near = node_near(nodes, cell, neighbour, medium)
             if near < 0:
@@ -349,7 +411,17 @@ def light_around(
                 continue
             if known.direct > 0 and best.direct == 2:
                 continue
-            if may_come_first(passage, nodes, known, medium, place, medium, best.time):
+            if not may_come_first(passage, nodes, known, medium, place, medium, best):
+                continue
+            speed = passage.speed[medium]
+            gain = expected_gain(passage, known, nodes.place[near], place, medium)
+            time = known.corner_time + wp.length(place - known.corner) / speed - gain
+            if time > best.time - NEGLIGIBLE * nodes.size / speed:
+                continue
+            if gain < SMALL * nodes.size / speed and is_clear(passage, medium, known.corner, place):
+                best = known
+                best.time = time
+            else:
                 route = onward(passage, known, nodes.place[near], medium, place, medium)
                 if route.time < best.time:
                     best = route

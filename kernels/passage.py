@@ -12,6 +12,8 @@ from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, scalar, vector2, ve
 
 CAUTION = wp.constant(scalar(0.8))  # of the distance to a surface that is stepped over; interpolated ones are inexact
 NEWTON_STEPS = wp.constant(4)
+CORNER_STEPS = wp.constant(8)
+CLOSE = wp.constant(scalar(1.0e-3))  # to the best corner: of a step
 HALVINGS = wp.constant(8)
 FLAT = wp.constant(scalar(1.0e-6))  # of a slope or a determinant that counts as 0
 LOWEST = wp.constant(scalar(-1.0e30))
@@ -74,9 +76,11 @@ def slope_at(passage: Passage, medium: int, place: vector3) -> vector3:
 
 
 @wp.func
-def normal_at(passage: Passage, medium: int, place: vector3) -> vector3:
-    """Unit vector out of the medium; zero where it has none."""
-    return wp.normalize(slope_at(passage, medium, place))
+def bend_at(passage: Passage, medium: int, place: vector3, direction: vector3) -> scalar:
+    """Second derivative of the signed distance along a unit vector [1/m], over two lattice spacings."""
+    way = direction * (TWO * passage.step)
+    both = distance_at(passage, medium, place + way) + distance_at(passage, medium, place - way)
+    return (both - TWO * distance_at(passage, medium, place)) / wp.dot(way, way)
 
 
 @wp.func
@@ -84,10 +88,14 @@ def onto_surface(passage: Passage, medium: int, place: vector3) -> vector3:
     """The place, moved along the gradient onto the surface of a medium (Newton's method)."""
     moved = place
     for _ in range(NEWTON_STEPS):
+        distance = distance_at(passage, medium, moved)
+        if wp.abs(distance) < CLOSE * passage.step:
+            break
         slope = slope_at(passage, medium, moved)
         square = wp.dot(slope, slope)
-        if square > FLAT:
-            moved -= slope * (distance_at(passage, medium, moved) / square)
+        if square < FLAT:
+            break
+        moved -= slope * (distance / square)
     return moved
 
 
@@ -156,9 +164,9 @@ def best_corner(
     """The corner, moved along a medium's surface to where the time of the way over it is stationary.
 
     Newton's method in the tangent plane: with the gradient g of the time, its Hessian H and the surface's unit normal n
-    the second derivative along the surface is H - (g . n) dn/dx.
+    the second derivatives along the surface are those of H - (g . n) grad grad d / |grad d|, d the signed distance.
     """
-    for _ in range(NEWTON_STEPS):
+    for _ in range(CORNER_STEPS):
         before = corner - start
         after = end - corner
         length = wp.length(before)
@@ -168,26 +176,28 @@ def best_corner(
         before /= length
         after /= length_after
         gradient = before * slowness - after * slowness_after
-        normal = normal_at(passage, surface, corner)
+        slope = slope_at(passage, surface, corner)
+        steepness = wp.length(slope)
+        if steepness < HALF * HALF:
+            break
+        normal = slope / steepness
         first = wp.normalize(before + after - normal * wp.dot(normal, before + after))
         if wp.dot(first, first) < HALF:
             break
         second = wp.cross(normal, first)
-        width = TWO * passage.step
-        turn_first = normal_at(passage, surface, corner + first * width)
-        turn_first = (turn_first - normal_at(passage, surface, corner - first * width)) / (TWO * width)
-        turn_second = normal_at(passage, surface, corner + second * width)
-        turn_second = (turn_second - normal_at(passage, surface, corner - second * width)) / (TWO * width)
-        push = wp.dot(gradient, normal)
+        push = wp.dot(gradient, normal) / steepness
         near = slowness / length
         far = slowness_after / length_after
         a = near * (ONE - wp.dot(before, first) ** TWO) + far * (ONE - wp.dot(after, first) ** TWO)
-        a -= push * wp.dot(turn_first, first)
         b = -near * wp.dot(before, first) * wp.dot(before, second)
         b -= far * wp.dot(after, first) * wp.dot(after, second)
-        b -= push * HALF * (wp.dot(turn_first, second) + wp.dot(turn_second, first))
         c = near * (ONE - wp.dot(before, second) ** TWO) + far * (ONE - wp.dot(after, second) ** TWO)
-        c -= push * wp.dot(turn_second, second)
+        a -= push * bend_at(passage, surface, corner, first)
+        c -= push * bend_at(passage, surface, corner, second)
+        diagonal = wp.normalize(first + second)
+        opposite = wp.normalize(first - second)
+        turn = bend_at(passage, surface, corner, diagonal) - bend_at(passage, surface, corner, opposite)
+        b -= push * HALF * turn
         along = wp.dot(gradient, first)
         across = wp.dot(gradient, second)
         determinant = a * c - b * b
@@ -195,8 +205,16 @@ def best_corner(
         if wp.abs(determinant) < FLAT * scale:
             break
         move = first * ((b * across - c * along) / determinant) + second * ((b * along - a * across) / determinant)
-        far_enough = TWO * passage.step
-        if wp.length(move) > far_enough:
-            move *= far_enough / wp.length(move)
-        corner = onto_surface(passage, surface, corner + move)
+        longest = TWO * TWO * passage.step
+        if wp.length(move) > longest:
+            move *= longest / wp.length(move)
+        moved = onto_surface(passage, surface, corner + move)
+        if slowness != slowness_after:  # a minimum: where Newton's step does not lead down, one that must
+            time = length * slowness + length_after * slowness_after
+            if wp.length(moved - start) * slowness + wp.length(end - moved) * slowness_after > time:
+                move = (first * along + second * across) / -(near + far)
+                moved = onto_surface(passage, surface, corner + move)
+        corner = moved
+        if wp.length(move) < CLOSE * passage.step:
+            break
     return corner

@@ -196,7 +196,11 @@ def _passage(domain: Domain, media: Sequence[Medium], device: wp.Device) -> Pass
     lower, upper = _bounds(media)
     first = np.floor((lower - domain.lower) / cell - LATTICE_MARGIN) * LATTICE_PER_CELL  # lattice points on faces
     points = np.ceil((upper - domain.lower) / spacing + LATTICE_MARGIN * LATTICE_PER_CELL - first).astype(int) + 1
-    axes = [domain.lower[n] + (first[n] + np.arange(points[n])) * spacing[n] for n in range(3)]
+    # What ends at a face of the domain goes on behind it, as in a mirror: half a cell before it no face is seen.
+    places = (
+        np.clip((first[n] + np.arange(points[n])) / LATTICE_PER_CELL, 0.5, domain.cells[n] - 0.5) for n in range(3)
+    )
+    axes = [domain.lower[n] + place * cell[n] for n, place in enumerate(places)]
     layers = max(1, CHUNK // int(points[1] * points[2]))
     distance = [
         medium.signed_distance(np.stack(np.meshgrid(part, axes[1], axes[2], indexing="ij"), axis=-1).reshape(-1, 3))
