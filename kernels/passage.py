@@ -15,6 +15,7 @@ NEWTON_STEPS = wp.constant(4)
 CORNER_STEPS = wp.constant(8)
 CLOSE = wp.constant(scalar(1.0e-3))  # to the best corner: of a step
 HALVINGS = wp.constant(8)
+STEEP = wp.constant(scalar(1.0e-2))  # a component along a surface that says nothing about a direction
 FLAT = wp.constant(scalar(1.0e-6))  # of a slope or a determinant that counts as 0
 LOWEST = wp.constant(scalar(-1.0e30))
 
@@ -152,6 +153,24 @@ def corner_between(passage: Passage, medium: int, start: vector3, end: vector3) 
 
 
 @wp.func
+def shortened(way: vector3, longest: scalar) -> vector3:
+    """A vector of the same direction, no longer than `longest`."""
+    length = wp.length(way)
+    return wp.where(length > longest, way * (longest / length), way)
+
+
+@wp.func
+def tangent(normal: vector3, way: vector3) -> vector3:
+    """A unit vector along a surface, in the direction of a way unless this is all but normal to it."""
+    along = way - normal * wp.dot(normal, way)
+    if wp.length(along) < STEEP:
+        axis = vector3()
+        axis[int(wp.argmin(wp.abs(normal)))] = ONE
+        along = axis - normal * wp.dot(normal, axis)
+    return wp.normalize(along)
+
+
+@wp.func
 def best_corner(
     passage: Passage,
     surface: int,
@@ -181,9 +200,7 @@ def best_corner(
         if steepness < HALF * HALF:
             break
         normal = slope / steepness
-        first = wp.normalize(before + after - normal * wp.dot(normal, before + after))
-        if wp.dot(first, first) < HALF:
-            break
+        first = tangent(normal, before + after)
         second = wp.cross(normal, first)
         push = wp.dot(gradient, normal) / steepness
         near = slowness / length
@@ -205,15 +222,12 @@ def best_corner(
         if wp.abs(determinant) < FLAT * scale:
             break
         move = first * ((b * across - c * along) / determinant) + second * ((b * along - a * across) / determinant)
-        longest = TWO * TWO * passage.step
-        if wp.length(move) > longest:
-            move *= longest / wp.length(move)
-        moved = onto_surface(passage, surface, corner + move)
+        moved = onto_surface(passage, surface, corner + shortened(move, TWO * TWO * passage.step))
         if slowness != slowness_after:  # a minimum: where Newton's step does not lead down, one that must
             time = length * slowness + length_after * slowness_after
             if wp.length(moved - start) * slowness + wp.length(end - moved) * slowness_after > time:
                 move = (first * along + second * across) / -(near + far)
-                moved = onto_surface(passage, surface, corner + move)
+                moved = onto_surface(passage, surface, corner + shortened(move, TWO * TWO * passage.step))
         corner = moved
         if wp.length(move) < CLOSE * passage.step:
             break

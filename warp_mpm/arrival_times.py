@@ -19,6 +19,7 @@ from warp_mpm.kernels.arrival import Ignition
 from warp_mpm.kernels.passage import Passage
 from warp_mpm.kernels.precision import NEVER, scalar, vector3
 from warp_mpm.kernels.records import Grid, Particles
+from warp_mpm.kernels.routes import Route
 from warp_mpm.scene import Charge, Domain, Scene
 
 LATTICE_PER_CELL = 2  # spacings of the lattice a cell: an obstacle of one cell is seen
@@ -233,7 +234,7 @@ def _nodes(domain: Domain, media: Sequence[Medium], device: wp.Device) -> eikona
     nodes.spacing, nodes.size = vector3(*cell), float(cell.min())
     total = nodes.count * nodes.media
     nodes.place = wp.zeros(total, dtype=vector3, device=device)
-    nodes.route = wp.zeros(total, dtype=eikonal.Route, device=device)
+    nodes.route = wp.zeros(total, dtype=Route, device=device)
     nodes.window = wp.zeros(total, dtype=int, device=device)
     nodes.touched = wp.zeros(total, dtype=int, device=device)
     nodes.certain = wp.zeros(total, dtype=int, device=device)

@@ -17,16 +17,16 @@ that the wave of the first has left the sphere before it meets theirs. It leaves
 
 the second terms where x is outside; inside they are later, if each t_i >= t_o + R / D_1 + (R - |x_i|) / D_2.
 
-**Problem 3**, the shadow. An inert sphere of radius R around the origin lies in an infinite explosive lit at x_d, at the
-distance d from its centre. Where the straight way is blocked the shortest one is a taut string: a tangent from x_d, an
-arc of a great circle, and a tangent to x at the distance r:
+**Problem 3**, the shadow. An inert sphere of radius R around the origin lies in an infinite explosive lit at x_d, at
+the distance d from its centre. Where the straight way is blocked the shortest one is a taut string: a tangent from x_d,
+an arc of a great circle, and a tangent to x at the distance r:
 
     t(x) = t_d + (sqrt(d^2 - R^2) + R theta + sqrt(r^2 - R^2)) / D,
     theta = alpha - arccos(R / d) - arccos(R / r) > 0,
 
-alpha the angle between x and x_d seen from the origin; where theta <= 0 x is in sight. t and its gradient are continuous
-across the shadow's edge theta = 0. Behind the sphere waves from all sides (in two dimensions from both) meet on the line
-alpha = pi.
+alpha the angle between x and x_d seen from the origin; where theta <= 0 x is in sight. t and its gradient are
+continuous across the shadow's edge theta = 0. Behind the sphere waves from all sides (in two dimensions from both) meet
+on the line alpha = pi.
 
 References: M. A. Kenamond, HE burn table verification problems, Los Alamos report LA-UR-11-03096 (2011); the report's
 formulas are quoted in the documentation of ExactPack (Los Alamos National Laboratory), `exactpack.solvers.kenamond`.
