@@ -7,7 +7,13 @@ import pytest
 
 from warp_mpm import charges
 from warp_mpm.builder import SceneBuilder
-from warp_mpm.detonators import PlaneDetonator, PointDetonator
+from warp_mpm.detonators import (
+    CordDetonator,
+    LineDetonator,
+    PlaneDetonator,
+    PointDetonator,
+    SphereDetonator,
+)
 from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box, Cylinder, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
@@ -170,9 +176,16 @@ def test_a_plane_lights_every_charge_it_cuts_or_touches_and_names_come_first():
     assert [detonator.charges for detonator in builder.build().detonators] == [("left", "right"), ("left",), ("right",)]
 
 
-def test_every_explosive_needs_a_detonator():
+def test_every_explosive_needs_a_detonator_or_a_neighbor_that_has_one():
     builder = two_charge_builder()
     builder.detonator(PointDetonator((0.02, 0.05, 0.05)))
+    assert builder.build().detonators[0].charges == ("left",)
+    builder = SceneBuilder("cube")
+    builder.domain((0, 0, 0), (0.1, 0.1, 0.1), cell_size=0.01)
+    builder.charge(Box((0, 0, 0), (0.05, 0.1, 0.1)), EXPLOSIVE, name="left")
+    builder.charge(Box((0.07, 0, 0), (0.1, 0.1, 0.1)), EXPLOSIVE, name="right")
+    builder.detonator(PointDetonator((0.02, 0.05, 0.05)))
+    builder.end_time(1e-5)
     assert "charge 'right': expected a detonator that lights this explosive, got none" in refusal(builder.build)
 
 
@@ -222,7 +235,7 @@ CALLS = [
     (lambda b: b.charge(CUBE, "tnt"), "charge 'charge_2': material: expected a Material, got 'tnt'"),
     (lambda b: b.charge(CUBE, EXPLOSIVE, name="cube"), "charge 'cube': expected a name of its own"),
     (lambda b: b.charge(CUBE, EXPLOSIVE, particles_per_axis=0), "particles_per_axis: expected a whole number of at le"),
-    (lambda b: b.detonator((0, 0, 0)), "detonator 2: expected a PointDetonator or a PlaneDetonator"),
+    (lambda b: b.detonator((0, 0, 0)), "detonator 2: expected a PointDetonator, LineDetonator"),
     (lambda b: b.detonator(PointDetonator((0, 0, math.inf))), "detonator 2: position: expected three finite numbers"),
     (
         lambda b: b.detonator(PointDetonator((0, 0, 0), time=-1e-6)),
@@ -230,6 +243,14 @@ CALLS = [
     ),
     (lambda b: b.detonator(PointDetonator((0, 0, 0), time=math.nan)), "detonator 2: time: expected a number of at lea"),
     (lambda b: b.detonator(PlaneDetonator((0, 0, 0), (0, 0, 0))), "detonator 2: normal: expected a vector of any leng"),
+    (
+        lambda b: b.detonator(LineDetonator((0, 0, 0), (0, 0, 0))),
+        "detonator 2: expected two points or more, each",
+    ),
+    (lambda b: b.detonator(SphereDetonator((0, 0, 0), 0.0)), "detonator 2: radius: expected a positive number"),
+    (lambda b: b.detonator(CordDetonator(((0, 0, 0),), 7e3)), "detonator 2: points: expected two points or more"),
+    (lambda b: b.detonator(CordDetonator(((0, 0, 0), (0, 0, 1)), 0)), "detonator 2: speed: expected a positive number"),
+    (lambda b: b.charge(CUBE, EXPLOSIVE, may_stay_unlit=1), "may_stay_unlit: expected True or False, got 1"),
     (lambda b: b.gravity((0, 0)), "gravity: expected three finite numbers"),
     (lambda b: b.ambient_pressure(-1), "ambient_pressure: expected a number of at least 0, got -1"),
     (lambda b: b.end_time(0), "end_time: expected a positive number, got 0"),
