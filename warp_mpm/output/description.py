@@ -4,11 +4,24 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from warp_mpm.detonators import Detonator, PlaneDetonator, PointDetonator
+from warp_mpm.detonators import (
+    CordDetonator,
+    Detonator,
+    LineDetonator,
+    PlaneDetonator,
+    PointDetonator,
+    SphereDetonator,
+)
 from warp_mpm.scene import Charge, Domain, Gauge, Scene, SectionPlane, Segment, Vector, Wall, Walls
 from warp_mpm.summary import theory
 
-DETONATORS: dict[str, type[Detonator]] = {"point": PointDetonator, "plane": PlaneDetonator}
+DETONATORS: dict[str, type[Detonator]] = {
+    "point": PointDetonator,
+    "plane": PlaneDetonator,
+    "line": LineDetonator,
+    "sphere": SphereDetonator,
+    "cord": CordDetonator,
+}
 
 
 @dataclass(frozen=True)
