@@ -3,7 +3,7 @@
 import pytest
 import warp as wp
 
-from warp_mpm.kernels import gauges, grid, material, reduce, shape, sharpen, strain, transfer
+from warp_mpm.kernels import eikonal, gauges, grid, material, reduce, shape, sharpen, strain, transfer
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
@@ -29,6 +29,7 @@ KERNELS = {
     "sharpen_velocity": sharpen.sharpen_velocity_kernel,
     "start_step": lambda: reduce.start_step,
     "record_gauges": lambda: gauges.record_gauges,
+    "eikonal": lambda: eikonal.spread,
     "initial_strain": lambda: initial_strain_kernel(shape.BSPLINE),
 }
 

@@ -16,7 +16,16 @@ from warp_mpm import version
 if TYPE_CHECKING:
     from warp_mpm.builder import SceneBuilder
     from warp_mpm.config import Layout, Order, Save, ShapeFunction, SolverConfig, Transfer
-    from warp_mpm.detonators import PlaneDetonator, PointDetonator
+    from warp_mpm.detonators import (
+        CordDetonator,
+        LineDetonator,
+        PlaneDetonator,
+        PointDetonator,
+        SphereDetonator,
+        grid,
+        ring,
+        row,
+    )
     from warp_mpm.errors import InputError, SimulationError
     from warp_mpm.geometry import Box, Cylinder, Sphere
     from warp_mpm.kernels.eos.ideal_gas import IdealGas
@@ -37,10 +46,12 @@ __all__ = [
     "JWL",
     "Box",
     "Burn",
+    "CordDetonator",
     "Cylinder",
     "IdealGas",
     "InputError",
     "Layout",
+    "LineDetonator",
     "Material",
     "MieGruneisen",
     "OnMismatch",
@@ -56,6 +67,7 @@ __all__ = [
     "SimulationError",
     "SolverConfig",
     "Sphere",
+    "SphereDetonator",
     "StiffenedGas",
     "Transfer",
     "Wall",
@@ -65,12 +77,15 @@ __all__ = [
     "ammonium_nitrate",
     "explosive",
     "find_material",
+    "grid",
     "inert",
     "library",
     "list_scenes",
     "load",
     "load_materials",
     "load_scene",
+    "ring",
+    "row",
     "simulate",
     "water",
 ]
@@ -78,7 +93,16 @@ __all__ = [
 _HOMES = {
     "builder": ("SceneBuilder",),
     "config": ("Layout", "Order", "Save", "ShapeFunction", "SolverConfig", "Transfer"),
-    "detonators": ("PlaneDetonator", "PointDetonator"),
+    "detonators": (
+        "CordDetonator",
+        "LineDetonator",
+        "PlaneDetonator",
+        "PointDetonator",
+        "SphereDetonator",
+        "grid",
+        "ring",
+        "row",
+    ),
     "errors": ("InputError", "SimulationError"),
     "geometry": ("Box", "Cylinder", "Sphere"),
     "kernels.eos.ideal_gas": ("IdealGas",),

@@ -147,7 +147,8 @@ class Problem(ABC):
     levels: tuple[Level, ...] = ()  # solved by default, coarsest first within a variant; none: only with --full
     more_levels: tuple[Level, ...] = ()  # solved besides with --full
     panels: tuple[Panel, ...] = ()  # of the picture
-    bounds: tuple[Bound, ...] = ()  # besides those on energy, mass and momentum, which every problem has
+    bounds: tuple[Bound, ...] = ()  # besides those on energy, mass and momentum
+    moves: bool = True  # False: a single step shows all there is; conservation is not judged
 
     @abstractmethod
     def scene(self, level: Level) -> Scene:

@@ -100,7 +100,8 @@ def run_problem(problem: Problem, levels: Iterable[Level], setup: Setup) -> Prob
     except SimulationError as error:
         failure = f"{problem.name} at {words_of(level)}: {error}"
     overall = dict(problem.overall(results)) if results else {}
-    verdicts = tuple(judge(bound, results, overall) for bound in (*problem.bounds, *CONSERVATION))
+    bounds = (*problem.bounds, *CONSERVATION) if problem.moves else problem.bounds
+    verdicts = tuple(judge(bound, results, overall) for bound in bounds)
     return ProblemReport(problem, tuple(results), overall, verdicts, failure)
 
 

@@ -56,6 +56,7 @@ class Kenamond(Problem):
     )
     more_levels = tuple(level for problem in (1, 2, 3) for level in ladder(160, problem=problem, dimensions=2))
     panels = (Panel("arrival", DISTANCE._replace(label="y"), TIME._replace(label="arrival time")),)
+    moves = False
     bounds = (
         Bound("time_cells", high=0.5, why="half a cell of travel time everywhere"),
         Bound("speed", high=SPEED_TOLERANCE, why="front pressure follows the local speed", from_cells=40),
