@@ -172,6 +172,50 @@ def may_come_first(
     return straight < best.time + gain * nodes.size / speed
 
 
+@wp.func
+def route_from_nodes(
+    passage: Passage, nodes: Nodes, cell: wp.vec3i, place: vector3, medium: int, straight: Route
+) -> Route:
+    """The first wave at a place in a cell: a straight one, or one that comes over the nodes around.
+
+    Where a node's corner is in sight of the place, and hardly moves, its time is known to second order at once. The
+    others are led on with care, the most promising first, as long as they may come earlier.
+    """
+    best = straight
+    speed = passage.speed[medium]
+    cell_time = nodes.size / speed
+    last = -NEVER
+    for attempt in range(28):
+        promise = scalar(1.0e30)
+        promising = wp.int32(-1)
+        for neighbour in range(27):
+            near = node_near(nodes, cell, neighbour, medium)
+            if not is_present(nodes, near):
+                continue
+            known = nodes.route[near]
+            if known.time >= NEVER or (known.direct > 0 and best.direct == 2):
+                continue
+            if not may_come_first(passage, nodes, known, medium, place, medium, best):
+                continue
+            gain = expected_gain(passage, known, nodes.place[near], place, medium)
+            time = known.corner_time + wp.length(place - known.corner) / speed - gain
+            if time > best.time - NEGLIGIBLE * cell_time:
+                continue
+            if attempt == 0 and gain < SMALL * cell_time and is_clear(passage, medium, known.corner, place):
+                best = known
+                best.time = time
+            elif time > last and time < promise:
+                promise = time
+                promising = near
+        if promise > best.time - SMALL * cell_time or promising < 0:
+            break
+        route = onward(passage, nodes.route[promising], nodes.place[promising], medium, place, medium)
+        if route.time < best.time:
+            best = route
+        last = promise
+    return best
+
+
 @wp.kernel(enable_backward=False)
 def light_around(
     particles: Particles,
@@ -196,29 +240,7 @@ def light_around(
         latest = nodes.route[own].time + TWO * nodes.size / passage.speed[medium]
     best = straight_route(passage, ignitions, medium, place, latest)
     if best.direct < 2 or nodes.media > 1:
-        for neighbour in range(27):
-            near = node_near(nodes, cell, neighbour, medium)
-            if near < 0:
-                continue
-            known = nodes.route[near]
-            if nodes.window[near] == ABSENT or known.time >= NEVER:
-                continue
-            if known.direct > 0 and best.direct == 2:
-                continue
-            if not may_come_first(passage, nodes, known, medium, place, medium, best):
-                continue
-            speed = passage.speed[medium]
-            gain = expected_gain(passage, known, nodes.place[near], place, medium)
-            time = known.corner_time + wp.length(place - known.corner) / speed - gain
-            if time > best.time - NEGLIGIBLE * nodes.size / speed:
-                continue
-            if gain < SMALL * nodes.size / speed and is_clear(passage, medium, known.corner, place):
-                best = known
-                best.time = time
-            else:
-                route = onward(passage, known, nodes.place[near], medium, place, medium)
-                if route.time < best.time:
-                    best = route
+        best = route_from_nodes(passage, nodes, cell, place, medium, best)
     particles.burn_times[p].arrival_time = wp.min(particles.burn_times[p].arrival_time, best.time)
     boost(particles, p, ignitions, place)
 
