@@ -117,11 +117,12 @@ CUBE_SCENE = """
 from warp_mpm import *
 
 def scene(*, gamma: float = 2.0, density: float = 1000.0, speed: float = 2800.0, detonator: float = 0.05,
-          upper: float = 0.1, lit: bool = True):
+          upper: float = 0.1, lit: bool = True, slit: bool = False):
     builder = SceneBuilder("cube")
     builder.domain((0, 0, 0), (0.1, 0.1, 0.1), cell_size=0.02)
     material = explosive("it", density=density, detonation_speed=speed, equation_of_state=IdealGas(gamma))
-    builder.charge(Box((0, 0, 0), (upper, 0.1, 0.1)), material)
+    solid = Box((0, 0, 0), (upper, 0.1, 0.1))
+    builder.charge(solid - Box((0.06, 0, 0), (0.08, 0.1, 0.1)) if slit else solid, material)
     if lit:
         builder.detonator(PointDetonator((detonator, 0.05, 0.05)))
     builder.end_time(1e-6)
@@ -146,6 +147,17 @@ def test_a_mistake_in_a_scene_is_one_clear_line(capfd, tmp_path, setting, messag
     line = mistake(capfd, "run", str(file), "--set", setting)
     assert line.startswith("warp-mpm: scene cube: ")
     assert message in line
+
+
+def test_explosive_that_no_wave_reaches_is_one_clear_line(capfd, tmp_path):
+    file = tmp_path / "cube.py"
+    file.write_text(CUBE_SCENE)
+    assert main(["run", str(file), "-o", str(tmp_path / "out"), "--set", "slit=yes"]) == 2
+    errors = capfd.readouterr().err
+    assert errors.startswith(
+        "warp-mpm: scene cube: charge 'charge_1': expected a detonation wave that comes to all of it"
+    )
+    assert errors.count("\n") == 1
 
 
 def test_an_output_directory_that_cannot_be_written(capfd, tmp_path):
