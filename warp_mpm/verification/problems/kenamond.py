@@ -48,7 +48,8 @@ class Kenamond(Problem):
     statement = (
         "A point detonator in a uniform explosive (problem=1); five delayed detonators in two concentric explosives, "
         "the inner one twice as fast (2); a detonator behind an inert sphere (3); in two dimensions (one cell thick, "
-        "detonators along z) and in three. 'time_cells' is the largest error of an arrival time in cells of travel, 'time_mean_cells' the mean one, "
+        "detonators along z) and in three. 'time_cells' is the largest error of an arrival time in cells of travel, "
+        "'time_mean_cells' the mean one, "
         "'speed' the largest relative error of the local speed 1 / |grad t_b| by differences over a cell between "
         "particles, away by two cells from detonators and from lines where waves meet; 'speed_rare' the share of "
         "particles at which it is above 0.5 %."
