@@ -6,171 +6,127 @@
     scatter_gradient   x_i += w_i a + dw_i/dx b + dw_i/dy c + dw_i/dz d
 
 Gather and scatter are each other's transpose. Values have several lanes, which a CPU takes together in its vector
-units: Warp's own vectors compile to scalar code there, so the loops are written once, in C++, over a vector type that
-is clang's on a CPU and Warp's on a GPU, where `add` is atomic. On a CPU threads work on slabs that share no node.
-`plain` asks for Warp's type on a CPU too: that is how tests run the code of the GPU.
+units: Warp's own vectors compile to scalar code there. So the loops are written once, in C++, over chunks of a row
+(`rows.py`), which are vectors of the compiler's on a CPU and nodes on a GPU. On a CPU threads work on slabs that share
+no node. `plain` asks for nodes on a CPU too: that is how tests run the code of the GPU.
+
+How many numbers a chunk has was measured (docs/numerics.md): two nodes' where values are gathered, one node's where
+gradients are, which need more registers; a whole row's where values are scattered, one node's where gradients are: the
+next particle's row may begin a node later, and then waits for what this one wrote.
 """
 
 import functools
+from collections.abc import Callable
 
 import warp as wp
 
 from warp_mpm.kernels.precision import REAL, scalar
+from warp_mpm.kernels.rows import Nodes, Row, Vectors, warp_type
 
 
 def value_type_of(lanes: int) -> type:
-    """A vector of as many lanes; a number for one."""
-    return scalar if lanes == 1 else wp.types.vector(lanes, scalar)
+    """A vector of as many lanes: 2, 4 or 8."""
+    return wp.types.vector(lanes, scalar)
 
 
-def _condition(plain: bool) -> str:
-    """When the vector types of the compiler are used: on a CPU, unless told not to."""
-    return "0" if plain else "defined(__clang__) && !defined(__CUDACC__)"
+WIDEST = 16  # numbers in a chunk
+AT = "auto* at = nodes.data + (size_t)(stencil.first + i * stencil.stride_x + j * stencil.stride_y);"
 
 
-def _warp_type(lanes: int) -> str:
-    """Warp's own type of as many values, in C++."""
-    return REAL if lanes == 1 else f"wp::vec_t<{lanes}, {REAL}>"
-
-
-def _lanes(count: int, plain: bool) -> str:
-    """Type `lanes` of as many values, and how to load and add them at a node."""
+def _compiled(body: Callable[[Row], str], lanes: int, width: int, widest: int, plain: bool) -> str:
+    """C++ for either kind of row."""
+    nodes = body(Nodes(lanes, width))
+    if plain:
+        return nodes
     return f"""
-#if {_condition(plain)}
-    typedef {REAL} lanes __attribute__((ext_vector_type({count})));
-    auto load = [](const void* node) {{ lanes x; __builtin_memcpy(&x, node, sizeof(x)); return x; }};
-    auto add = [=](void* node, lanes x) {{ x += load(node); __builtin_memcpy(node, &x, sizeof(x)); }};
-    auto plus = [](lanes sum, lanes x, {REAL} weight) {{ return __builtin_elementwise_fma(x, (lanes)weight, sum); }};
+#if defined(__clang__) && !defined(__CUDACC__)
+{body(Vectors(lanes, width, widest))}
 #else
-    typedef {_warp_type(count)} lanes;
-    auto load = [](const lanes* node) {{ return *node; }};
-    auto add = [](lanes* node, lanes x) {{ wp::atomic_add(node, x); }};
-    auto plus = [](lanes sum, lanes x, {REAL} weight) {{ return wp::add(sum, wp::mul(x, weight)); }};
+{nodes}
 #endif
 """
 
 
-ROW = 6  # numbers: rows up to this long are added at once
-
-
-def _scatter_rows(lanes: int, width: int, plain: bool) -> str:
-    """Scatter of values so short that a whole row of them is added at once, as four or eight numbers.
-
-    What is beyond a row of three is written back as it was. That reaches one node farther than the stencil, still short
-    of what another thread may write to (see `LARGEST_DRIFT`), and arrays have a node to spare.
-    """
-    numbers = 4 if lanes * width <= 4 else 8
-    return f"""
-    {REAL} given[{lanes}];
-    memcpy(given, &value, sizeof(given));
-#if {_condition(plain)}
-    typedef {REAL} lanes __attribute__((ext_vector_type({numbers})));
-    lanes along = {{}};
-    for (int k = 0; k < {width}; ++k)
-        for (int lane = 0; lane < {lanes}; ++lane)
-            along[k * {lanes} + lane] = stencil.wz[k] * given[lane];
-    for (int i = 0; i < {width}; ++i)
-        for (int j = 0; j < {width}; ++j) {{
-            auto* row = nodes.data + (size_t)(stencil.first + i * stencil.stride_x + j * stencil.stride_y);
-            lanes x;
-            __builtin_memcpy(&x, row, sizeof(x));
-            x = __builtin_elementwise_fma(along, (lanes)(stencil.wx[i] * stencil.wy[j]), x);
-            __builtin_memcpy(row, &x, sizeof(x));
+def _gather(row: Row) -> str:
+    return f"""{row.declarations()}
+{row.each("    T@ total@ = {};")}
+    for (int i = 0; i < {row.width}; ++i) {{
+{row.each("        T@ plane@ = {};")}
+        for (int j = 0; j < {row.width}; ++j) {{
+            {AT}
+{row.each("            plane@ = plus(plane@, load@(at), stencil.wy[j]);")}
         }}
-#else
-    for (int i = 0; i < {width}; ++i)
-        for (int j = 0; j < {width}; ++j)
-            for (int k = 0; k < {width}; ++k)
-                wp::atomic_add(
-                    nodes.data + stencil.first + i * stencil.stride_x + j * stencil.stride_y + k,
-                    wp::mul(value, stencil.wx[i] * stencil.wy[j] * stencil.wz[k]));
-#endif
-"""
-
-
-def _gather(lanes: int, width: int, plain: bool) -> str:
-    return f"""{_lanes(lanes, plain)}
-    lanes total = {{}};
-    for (int i = 0; i < {width}; ++i) {{
-        lanes plane = {{}};
-        for (int j = 0; j < {width}; ++j) {{
-            auto* row = nodes.data + (size_t)(stencil.first + i * stencil.stride_x + j * stencil.stride_y);
-            lanes along = {{}};
-            for (int k = 0; k < {width}; ++k)
-                along = plus(along, load(row + k), stencil.wz[k]);
-            plane = plus(plane, along, stencil.wy[j]);
-        }}
-        total = plus(total, plane, stencil.wx[i]);
+{row.each("        total@ = plus(total@, plane@, stencil.wx[i]);")}
     }}
-    {_warp_type(lanes)} result;
-    memcpy(&result, &total, sizeof(result));
+{row.weights("wz", "stencil.wz")}
+    lanes sum = {row.total("total", "wz")};
+    {warp_type(row.lanes)} result;
+    memcpy(&result, &sum, sizeof(result));
     return result;
 """
 
 
-def _gather_gradient(lanes: int, width: int, plain: bool) -> str:
-    return f"""{_lanes(lanes, plain)}
-    lanes total = {{}}, by_x = {{}}, by_y = {{}}, by_z = {{}};
-    for (int i = 0; i < {width}; ++i) {{
-        lanes plane = {{}}, plane_y = {{}}, plane_z = {{}};
-        for (int j = 0; j < {width}; ++j) {{
-            auto* row = nodes.data + (size_t)(stencil.first + i * stencil.stride_x + j * stencil.stride_y);
-            lanes along = {{}}, across = {{}};
-            for (int k = 0; k < {width}; ++k) {{
-                lanes x = load(row + k);
-                along = plus(along, x, stencil.wz[k]);
-                across = plus(across, x, stencil.sz[k]);
-            }}
-            plane = plus(plane, along, stencil.wy[j]);
-            plane_y = plus(plane_y, along, stencil.sy[j]);
-            plane_z = plus(plane_z, across, stencil.wy[j]);
+def _gather_gradient(row: Row) -> str:
+    return f"""{row.declarations()}
+{row.each("    T@ total@ = {}, by_x@ = {}, by_y@ = {};")}
+    for (int i = 0; i < {row.width}; ++i) {{
+{row.each("        T@ plane@ = {}, plane_y@ = {};")}
+        for (int j = 0; j < {row.width}; ++j) {{
+            {AT}
+{row.each("            T@ x@ = load@(at);")}
+{row.each("            plane@ = plus(plane@, x@, stencil.wy[j]);")}
+{row.each("            plane_y@ = plus(plane_y@, x@, stencil.sy[j]);")}
         }}
-        total = plus(total, plane, stencil.wx[i]);
-        by_x = plus(by_x, plane, stencil.sx[i]);
-        by_y = plus(by_y, plane_y, stencil.wx[i]);
-        by_z = plus(by_z, plane_z, stencil.wx[i]);
+{row.each("        total@ = plus(total@, plane@, stencil.wx[i]);")}
+{row.each("        by_x@ = plus(by_x@, plane@, stencil.sx[i]);")}
+{row.each("        by_y@ = plus(by_y@, plane_y@, stencil.wx[i]);")}
     }}
-    wp::mat_t<4, {lanes}, {REAL}> result;
-    memcpy(&result.data[0][0], &total, sizeof(lanes));
-    memcpy(&result.data[1][0], &by_x, sizeof(lanes));
-    memcpy(&result.data[2][0], &by_y, sizeof(lanes));
-    memcpy(&result.data[3][0], &by_z, sizeof(lanes));
+{row.weights("wz", "stencil.wz")}
+{row.weights("sz", "stencil.sz")}
+    lanes sums[4] = {{
+        {row.total("total", "wz")},
+        {row.total("by_x", "wz")},
+        {row.total("by_y", "wz")},
+        {row.total("total", "sz")}
+    }};
+    wp::mat_t<4, {row.lanes}, {REAL}> result;
+    memcpy(&result, sums, sizeof(result));
     return result;
 """
 
 
-def _scatter(lanes: int, width: int, plain: bool) -> str:
-    return f"""{_lanes(lanes, plain)}
-    lanes nothing = {{}}, given;
-    memcpy(&given, &value, sizeof(lanes));
-    for (int i = 0; i < {width}; ++i)
-        for (int j = 0; j < {width}; ++j) {{
-            auto* row = nodes.data + (size_t)(stencil.first + i * stencil.stride_x + j * stencil.stride_y);
-            lanes along = plus(nothing, given, stencil.wx[i] * stencil.wy[j]);
-            for (int k = 0; k < {width}; ++k)
-                add(row + k, plus(nothing, along, stencil.wz[k]));
-        }}
-"""
-
-
-def _scatter_gradient(lanes: int, width: int, plain: bool) -> str:
-    return f"""{_lanes(lanes, plain)}
-    lanes nothing = {{}}, given, by_x, by_y, by_z;
-    memcpy(&given, &value, sizeof(lanes));
-    memcpy(&by_x, &x, sizeof(lanes));
-    memcpy(&by_y, &y, sizeof(lanes));
-    memcpy(&by_z, &z, sizeof(lanes));
-    for (int i = 0; i < {width}; ++i)
-        for (int j = 0; j < {width}; ++j) {{
-            auto* row = nodes.data + (size_t)(stencil.first + i * stencil.stride_x + j * stencil.stride_y);
+def _scatter(row: Row) -> str:
+    return f"""{row.declarations()}
+    lanes given = as_lanes(value);
+{row.weights("wz", "stencil.wz")}
+{row.each("    T@ along@ = mul(repeat@(given), wz@);")}
+    for (int i = 0; i < {row.width}; ++i)
+        for (int j = 0; j < {row.width}; ++j) {{
+            {AT}
             {REAL} wij = stencil.wx[i] * stencil.wy[j];
-            lanes along = plus(nothing, given, wij);
-            along = plus(along, by_x, stencil.sx[i] * stencil.wy[j]);
-            along = plus(along, by_y, stencil.wx[i] * stencil.sy[j]);
-            lanes across = plus(nothing, by_z, wij);
-            for (int k = 0; k < {width}; ++k)
-                add(row + k, plus(plus(nothing, along, stencil.wz[k]), across, stencil.sz[k]));
+{row.each("            end@(at, plus(begin@(at), along@, wij));")}
         }}
+"""
+
+
+def _scatter_gradient(row: Row) -> str:
+    return f"""{row.declarations()}
+    lanes given = as_lanes(value), given_x = as_lanes(x);
+    lanes given_y = as_lanes(y), given_z = as_lanes(z);
+{row.weights("wz", "stencil.wz")}
+{row.weights("sz", "stencil.sz")}
+{row.each("    T@ along@ = plus(mul(repeat@(given), wz@), repeat@(given_z), sz@);")}
+{row.each("    T@ along_x@ = mul(repeat@(given_x), wz@);")}
+{row.each("    T@ along_y@ = mul(repeat@(given_y), wz@);")}
+    for (int i = 0; i < {row.width}; ++i) {{
+{row.each("        T@ plane@ = plus(mul(along@, stencil.wx[i]), along_x@, stencil.sx[i]);")}
+{row.each("        T@ plane_y@ = mul(along_y@, stencil.wx[i]);")}
+        for (int j = 0; j < {row.width}; ++j) {{
+            {AT}
+{row.each("            T@ x@ = plus(mul(plane@, stencil.wy[j]), plane_y@, stencil.sy[j]);  // small: rounded little")}
+{row.each("            end@(at, begin@(at) + x@);")}
+        }}
+    }}
 """
 
 
@@ -216,7 +172,7 @@ def gather_function(width: int, lanes: int, plain: bool = False) -> wp.Function:
     record = stencil_type(width)
     value_type = value_type_of(lanes)
 
-    @wp.func_native(_gather(lanes, width, plain))
+    @wp.func_native(_compiled(_gather, lanes, width, 2 * lanes, plain))
     def gather(stencil: record, nodes: wp.array(dtype=value_type)) -> value_type: ...
 
     return gather
@@ -229,7 +185,7 @@ def gather_gradient_function(width: int, lanes: int, plain: bool = False) -> wp.
     value_type = value_type_of(lanes)
     rows_type = wp.types.matrix((4, lanes), scalar)
 
-    @wp.func_native(_gather_gradient(lanes, width, plain))
+    @wp.func_native(_compiled(_gather_gradient, lanes, width, lanes, plain))
     def gather_gradient(stencil: record, nodes: wp.array(dtype=value_type)) -> rows_type: ...
 
     return gather_gradient
@@ -241,7 +197,7 @@ def scatter_function(width: int, lanes: int, plain: bool = False) -> wp.Function
     record = stencil_type(width)
     value_type = value_type_of(lanes)
 
-    @wp.func_native(_scatter_rows(lanes, width, plain) if lanes * width <= ROW else _scatter(lanes, width, plain))
+    @wp.func_native(_compiled(_scatter, lanes, width, WIDEST, plain))
     def scatter(stencil: record, nodes: wp.array(dtype=value_type), value: value_type): ...
 
     return scatter
@@ -253,7 +209,7 @@ def scatter_gradient_function(width: int, lanes: int, plain: bool = False) -> wp
     record = stencil_type(width)
     value_type = value_type_of(lanes)
 
-    @wp.func_native(_scatter_gradient(lanes, width, plain))
+    @wp.func_native(_compiled(_scatter_gradient, lanes, width, lanes, plain))
     def scatter_gradient(
         stencil: record,
         nodes: wp.array(dtype=value_type),

@@ -107,12 +107,12 @@ def test_counts_by_hand():
     # Mass, density, velocity, pressures, sound speed, thrust in; eight lanes, the field's and the cells', in and out.
     assert count["particles to grid"].particle_bytes == 18 + 4 * (1 + 1 + 3 + 2 + 1 + 3)
     assert count["particles to grid"].node_bytes == 2 * 4 * (8 + 2 + 2)
-    scattered = 8 * (2 * 27 + 4 * 9) + 2 * (27 + 9) + 2 * (8 + 4)
+    scattered = 8 * (2 * 27 + 3 * 9 + 4 * 3) + 2 * (27 + 3) + 2 * (8 + 2)
     assert count["particles to grid"].particle_operations == scattered + 36 + 24 + counts.FORCES
     # Mass in, velocity in and out; eight lanes in, four in and out.
     assert count["grid to particles and back"].particle_bytes == 18 + 4 * 7
     assert count["grid to particles and back"].node_bytes == 4 * (8 + 2 * 4)
-    assert count["grid to particles and back"].particle_operations == 8 * (27 + 9 + 3) + 4 * (27 + 9) + 36 + 6
+    assert count["grid to particles and back"].particle_operations == 8 * (27 + 9 + 3) + 4 * (27 + 3) + 36 + 6
     assert count["clear"].node_bytes == 4 * (8 + 2 + 2 + 4 + 8)
     assert count["time step"] == counts.Count()
 
@@ -121,19 +121,20 @@ def test_counts_by_hand():
 def test_formulas_count_the_loops(width):
     """The loops of `kernels/stencil.py`, walked through."""
     gathered = gathered_with_gradient = scattered = scattered_with_gradient = 0
-    for _ in range(width):
-        for _ in range(width):
-            scattered += 1
-            scattered_with_gradient += 4  # along: three terms, across: one
-            for _ in range(width):
+    for _ in range(width):  # the nodes of a row
+        for _ in range(width):  # planes
+            for _ in range(width):  # rows of a plane
                 gathered += 1
-                gathered_with_gradient += 2
+                gathered_with_gradient += 2  # plane, plane_y
                 scattered += 1
                 scattered_with_gradient += 2
             gathered += 1
-            gathered_with_gradient += 3
+            gathered_with_gradient += 3  # total, by_x, by_y
+            scattered_with_gradient += 3
         gathered += 1
         gathered_with_gradient += 4
+        scattered += 1
+        scattered_with_gradient += 4
     assert counts.gather(width, 5) == 5 * gathered
     assert counts.gather_gradient(width, 5) == 5 * gathered_with_gradient
     assert counts.scatter(width, 5) == 5 * scattered

@@ -68,12 +68,12 @@ def gather_gradient(width: int, lanes: int) -> int:
 
 def scatter(width: int, lanes: int) -> int:
     """Operations to add w a to all nodes."""
-    return lanes * (width**3 + width**2)
+    return lanes * (width**3 + width)
 
 
 def scatter_gradient(width: int, lanes: int) -> int:
     """Operations to add w a + dw/dx b + dw/dy c + dw/dz d to all nodes."""
-    return lanes * (2 * width**3 + 4 * width**2)
+    return lanes * (2 * width**3 + 3 * width**2 + 4 * width)
 
 
 def weights(width: int) -> int:
