@@ -63,6 +63,13 @@ class Audit:
         """Largest defect over the largest sum m |v|; None before anything has moved."""
         return self.largest_momentum_defect / self.largest_momentum if self.largest_momentum > 0.0 else None
 
+    @property
+    def clamped_share(self) -> float:
+        """Energy added to particles that would have had less than none, over that of all at the start."""
+        if self._first is None or self._last is None:
+            return 0.0
+        return self._last.clamped_energy / abs(self._energy(self._first))
+
     def add(self, totals: Totals) -> None:
         """Take the totals of a later instant into account."""
         first = self._first = self._first or totals

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, fields
 from enum import Enum
 from pathlib import Path
@@ -16,7 +16,7 @@ from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, totals_of
 from warp_mpm.errors import SimulationError, Terminated
 from warp_mpm.fingerprint import fingerprints
-from warp_mpm.guards import check_faults, check_memory, writable_directory
+from warp_mpm.guards import check_memory, check_state, clamp_warnings, writable_directory
 from warp_mpm.isosurface import pressure_isosurface
 from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.launch import Launcher, find_device
@@ -89,7 +89,8 @@ def simulate(
         run.sum_up("interrupted")
         raise
     except SimulationError as error:
-        run.sum_up(f"failed: {error}")
+        with suppress(SimulationError):  # a disk that was full may still be
+            run.sum_up(f"failed: {error}")
         raise SimulationError(f"{error}{run.checkpoints.remedy()}") from error
     finally:
         run.launcher.close()
@@ -196,7 +197,7 @@ class _Run:
             self.recorder.record()
             self.steps += 1
         clock = self.state.clock_values()
-        check_faults(self.state, self.steps)
+        check_state(self.state, self.steps)
         self.solver.sort_if_due()
         if self.steps - self.audited_step >= STEPS_BETWEEN_AUDITS:
             self._audit()
@@ -358,7 +359,7 @@ class _Run:
             },
             "pressure_spread": final["pressure_spread"],
             "particle_volume_error": self._volume_error(),
-            "warnings": [*self.scene.warnings, *self.warnings, *self._frame_warnings()],
+            "warnings": [*self.scene.warnings, *self.warnings, *self._frame_warnings(), *clamp_warnings(self.audit)],
         }
 
     def _volume_error(self) -> float | None:
