@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from scenes_for_tests import block, start
+from scenes_for_tests import OPEN, block, inert_gas, start
 
 from warp_mpm import guards, simulation
 from warp_mpm.config import Save
@@ -46,6 +46,15 @@ def test_an_absurd_particle_stops_the_run(device, monkeypatch, name, value, mess
     )
     with pytest.raises(SimulationError, match=pattern):
         simulate(block((6, 4, 3), end_time=1e-5), device=device, threads=1)
+
+
+def test_gas_that_implodes_at_once_is_stopped(device):
+    """A ball at 40 Pa in air at 1e5 Pa: its first time step, by its own sound speed, is 40 times too long for that."""
+    air = block(
+        (4, 4, 4), material=inert_gas(1.0, 1e2), walls=OPEN, margin_cells=2, ambient_pressure=1e5, end_time=1e-4
+    )
+    with pytest.raises(SimulationError, match=r"^block: step \d at [^\n]*; try a smaller cfl[^\n]*$"):
+        simulate(air, device=device, threads=1)
 
 
 def test_time_steps_that_come_to_no_end_stop_the_run(device):

@@ -28,6 +28,19 @@ def run_files(
         InputError: one of the frames to keep is not there.
     """
     with ExitStack() as stack:
+        tables: list[TableWriter] = []
+        kept = list(history)
+
+        def start_history(row: Row) -> None:
+            rows = [row_values(before, row) for before in kept]
+            tables.append(stack.enter_context(TableWriter(path, list(row), rows)))
+
+        # What has a row can be shown, so rows go before their frames go, and come after them.
+        path = directory / "history.csv"
+        if kept:
+            start_history(kept[0])
+        else:
+            path.unlink(missing_ok=True)  # what an earlier run left
         usd = stack.enter_context(
             UsdWriter(
                 directory / f"{scene.name}.usdc",
@@ -39,23 +52,15 @@ def run_files(
                 isosurface=save.isosurface,
                 layout=save.layout,
                 usdz=save.usdz,
-                kept=len(history),
+                kept=len(kept),
             )
         )
         write_gauges = _gauge_writer(directory / "gauges.csv", scene, recorder, stack)
-        tables: list[TableWriter] = []
-
-        def start_history(row: Row, rows: Sequence[Row]) -> None:
-            values = [row_values(before, row) for before in rows]
-            tables.append(stack.enter_context(TableWriter(directory / "history.csv", list(row), values)))
-
-        if history:
-            start_history(history[0], history)
 
         def write(frame: Frame, row: Row) -> None:
-            usd.write(frame)  # before its row: what has a row can be shown
+            usd.write(frame)
             if not tables:
-                start_history(row, ())
+                start_history(row)
             tables[0].write(row)
             write_gauges()
 
