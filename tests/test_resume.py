@@ -253,13 +253,20 @@ FORGED = {
     "a clock of text": lambda file: rewritten(file, **{"state.clock": np.array("noon")}),
     "other rows": lambda file: rewritten(file, **{"record.rows": np.zeros((3, 3))}),
     "no header": lambda file: rewritten(file, header=np.array("[]")),
-    "a header without values": lambda file: rewritten(file, header=without_values(file)),
+    "a header without values": lambda file: rewritten(file, header=with_values(file, lambda values: {})),
+    "a history without rows": lambda file: rewritten(file, header=with_values(file, no_history)),
 }
 
 
-def without_values(file):
+def no_history(values):
+    return {**values, "history": []}
+
+
+def with_values(file, change):
+    """The header of a checkpoint, with other values."""
     with np.load(file) as arrays:
-        return np.array(json.dumps({**json.loads(str(arrays["header"])), "values": {}}))
+        header = json.loads(str(arrays["header"]))
+    return np.array(json.dumps({**header, "values": change(header["values"])}))
 
 
 @pytest.mark.parametrize("forge", FORGED.values(), ids=FORGED)

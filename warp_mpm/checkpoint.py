@@ -83,7 +83,7 @@ class Checkpoints:
         if unreadable:
             raise unreadable[0]
         got = "no directory" if self._directory is None else f"none in {str(self._directory)!r}"
-        raise mistake("resume", "a checkpoint to go on from", got, "start anew, without --resume")
+        raise mistake("resume", "a checkpoint to go on from", got, "unless it is complete, start anew without --resume")
 
     @contextmanager
     def must_fit(self) -> Iterator[None]:

@@ -159,9 +159,10 @@ class _Run:
                     self._save_due(write, now)
                     peak = self.history[-1]["peak_pressure_pa"]
                     self.progress.update(now, end, self.steps, f"peak {peak / 1e9:.2f} GPa")
-                    if now < end and (stop.signal is not None or self.checkpoints.due(self.steps)):
+                    if now < end and self.checkpoints.due(self.steps):
                         self._write_checkpoint()
             if now < end:
+                self._write_checkpoint()
                 if self.history[-1]["step"] < self.steps:  # the state at the stop; who goes on writes this frame anew
                     self._save_frames(write, now, 1)
                 raise stop.exception(f"interrupted at {now * 1e6:.3f} us{self.checkpoints.remedy()}")
@@ -268,6 +269,8 @@ class _Run:
             pictures = zip(arrays.get("pictures.time", ()), arrays.get("pictures.pressure", ()), strict=True)
             self.pictures = [SectionPicture(float(time), pressure) for time, pressure in pictures]
             self.history = values["history"]
+            if not self.history:
+                raise ValueError("no frames")
             self.steps, self.audited_step = values["steps"], values["audited_step"]
             self.solver_seconds = values["solver_seconds"]
             self.begin -= values["wall_seconds"]
