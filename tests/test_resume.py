@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes_for_tests import OPEN, ORDERS_AND_TRANSFERS, advance, block, start
+from scenes_for_tests import ORDERS_AND_TRANSFERS, advance, block, start
 
 from warp_mpm import launch
 from warp_mpm.checkpoint import restore_solver, saved_solver
@@ -21,6 +21,7 @@ from warp_mpm.config import Layout, Save, SolverConfig
 from warp_mpm.errors import InputError, Terminated
 from warp_mpm.output.checkpoint import checkpoint_files
 from warp_mpm.progress import Silent
+from warp_mpm.scene import Wall, Walls
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import Result, simulate
 
@@ -78,8 +79,9 @@ def assert_same_results(directory: Path, whole: Path) -> None:
 @pytest.mark.parametrize(("order", "transfer"), ORDERS_AND_TRANSFERS)
 @pytest.mark.parametrize("steps", [0, 3, 31])
 def test_a_restored_solver_goes_on_bit_for_bit(order, transfer, steps):
-    """In free expansion, with matter leaving; between two sortings, soon after one, and before the first step."""
-    free = block((8, 6, 4), walls=OPEN, margin_cells=2)
+    """Against two walls and into the open; between two sortings, soon after one, and before the first step."""
+    walls = Walls(Wall.SLIP, Wall.OPEN, Wall.STICK, Wall.OPEN, Wall.OPEN, Wall.OPEN)
+    free = block((8, 6, 4), walls=walls, margin_cells=(0, 2, 0, 2, 2, 2))
     solver = advance(start(free, order=order, transfer=transfer), steps)
     saved = saved_solver(solver)
     restored = start(free, order=order, transfer=transfer)

@@ -69,6 +69,7 @@ __all__ = [
     "Sphere",
     "SphereDetonator",
     "StiffenedGas",
+    "Terminated",
     "Transfer",
     "Wall",
     "Walls",
