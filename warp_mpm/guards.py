@@ -29,9 +29,10 @@ def writable_directory(path: Path) -> Path:
         path.mkdir(parents=True, exist_ok=True)
         probe.write_bytes(b"")
         probe.unlink()
-    except OSError as error:
+    except (OSError, ValueError) as error:  # the latter for a name that no file can have
+        reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            f"output: expected a directory that can be written, got {str(path)!r} ({error.strerror}); "
+            f"output: expected a directory that can be written, got {str(path)!r} ({reason}); "
             "choose another one with -o"
         ) from error
     return path
