@@ -1,114 +1,15 @@
-"""Whatever scene a person describes, it is either refused in one line, or runs with its mass and energy kept."""
+"""Commands, paths and files that make no sense are refused in one line."""
 
-import math
-
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
-from scenes_for_tests import ROUND_OFF, audited, inert_gas, start
 
-from warp_mpm.builder import SceneBuilder
 from warp_mpm.cli import main
 from warp_mpm.config import Save
-from warp_mpm.detonators import PlaneDetonator, PointDetonator
-from warp_mpm.geometry import Box, Cylinder, Sphere
-from warp_mpm.kernels.eos.ideal_gas import IdealGas
-from warp_mpm.materials import ammonium_nitrate, explosive
-from warp_mpm.scene import Wall, Walls
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import simulate
 
-LENGTH = 0.1  # edge of the domain [m]
-CELLS = 8  # along it
-NONSENSE = (0.0, -1.0, math.nan, math.inf, -math.inf, 1e300, 1e-300, "much", None, True, (), [1.0])
-NUMBERS = NONSENSE[:7]
 FEW = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
-
-
-def seldom(usual, nonsense=NONSENSE):
-    """Mostly what makes sense, once in fifty times something that does not."""
-    return some.integers(0, 49).flatmap(lambda n: some.sampled_from(nonsense) if n == 7 else usual)
-
-
-def place(low, high):
-    """A point whose coordinates lie between two lengths."""
-    return seldom(some.tuples(*3 * [some.floats(low * LENGTH, high * LENGTH)]))
-
-
-MIDDLE = place(0.45, 0.5)
-lengths = seldom(some.floats(0.1 * LENGTH, 0.5 * LENGTH))
-solids = some.one_of(
-    some.builds(Box, place(0.0, 0.4), place(0.6, 1.0)),
-    some.builds(Sphere, MIDDLE, lengths),
-    some.builds(Cylinder, place(0.2, 0.4), place(0.6, 0.8), lengths),
-)
-walls = some.builds(Walls, *6 * [some.sampled_from(Wall)])
-times = seldom(some.floats(0.0, 1e-5))
-detonators = seldom(
-    some.one_of(
-        some.builds(PointDetonator, MIDDLE, times), some.builds(PlaneDetonator, MIDDLE, place(0.1, 1.0), times)
-    ),
-    ("here", None),
-)
-gases = some.builds(inert_gas, seldom(some.floats(0.1, 8000.0)), seldom(some.floats(1e2, 1e7)))
-explosives = some.one_of(
-    some.builds(ammonium_nitrate),
-    some.builds(
-        lambda density, speed, gamma: explosive(
-            "it", density=density, detonation_speed=speed, equation_of_state=IdealGas(gamma)
-        ),
-        seldom(some.floats(500.0, 2000.0)),
-        seldom(some.floats(1000.0, 9000.0)),
-        seldom(some.floats(1.2, 4.0), NUMBERS),
-    ),
-)
-
-
-def built(data):
-    """The scene of a person who tries this and that, or None if it was refused in one line."""
-    draw = data.draw
-    try:
-        builder = SceneBuilder("it")
-        upper = draw(seldom(some.just((LENGTH, LENGTH, LENGTH))))
-        builder.domain(
-            (0.0, 0.0, 0.0), upper, cells=draw(seldom(some.just((CELLS, CELLS, CELLS)), (0, 10**6, 1.5, "8")))
-        )
-        builder.walls(draw(walls))
-        burns = draw(some.booleans())
-        for _ in range(draw(some.sampled_from((1, 1, 1, 2)))):
-            velocity = draw(seldom(some.one_of(some.none(), some.tuples(*3 * [some.floats(-2000.0, 2000.0)]))))
-            per_axis = draw(seldom(some.sampled_from((1, 2, 3))))
-            material = draw(explosives if burns else gases)
-            builder.charge(draw(solids), material, particles_per_axis=per_axis, velocity=velocity)
-        for _ in range(draw(some.integers(1, 2)) if burns else draw(some.sampled_from((0, 0, 0, 1)))):
-            builder.detonator(draw(detonators))
-        builder.gravity(draw(seldom(some.sampled_from(((0.0, 0.0, 0.0), (0.0, 0.0, -9.81))))))
-        if burns:  # air around thinner gas: `test_guards.py`
-            builder.ambient_pressure(draw(seldom(some.sampled_from((0.0, 1e5)))))
-        builder.gauge(draw(MIDDLE), moving=draw(seldom(some.booleans())))
-        builder.end_time(draw(seldom(some.floats(1e-6, 1e-3))))
-        return builder.build()
-    except ValueError as error:  # as InputError is, and as an equation of state raises
-        message = str(error)
-    assert "\n" not in message
-    assert "expected" in message
-    return None
-
-
-@FEW
-@given(some.data())
-def test_a_scene_is_refused_in_one_line_or_runs(data):
-    """Ten steps: mass is kept to the round-off of a sum, and energy to that of ten steps."""
-    scene = built(data)
-    if scene is None:
-        return
-    audit = audited(start(scene), 10)
-    assert audit.mass_error < 32 * ROUND_OFF
-    assert audit.energy_error < 1e-5
-    assert np.isfinite(audit.energy_error)
-
-
 words = some.one_of(
     some.text(max_size=12), some.sampled_from(("nan", "inf", "-1", "0", "1e999", "é", "../..", "=", "a=b=c"))
 )
