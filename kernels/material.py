@@ -14,7 +14,7 @@ from typing import Any
 import warp as wp
 
 from warp_mpm.kernels.content import FILLING, PRESSURE, inside
-from warp_mpm.kernels.motion import Faces, place, settle
+from warp_mpm.kernels.motion import Faces, place, report_fault, settle
 from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Clock, Grid, Maxima, Particles, raise_maxima
 from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, gas_share, relax_density
@@ -36,6 +36,7 @@ from warp_mpm.kernels.viscosity import (
 PER_IGNITED = wp.constant(scalar(10.0))  # the viscosity sets in over the first tenth of the burn
 BURNT_OUT = wp.constant(scalar(0.9))  # the relaxation over the last tenth
 PER_BURNT_OUT = wp.constant(scalar(10.0))
+HUGE = wp.constant(scalar(1.0e30))  # no pressure [Pa] and no energy [J/kg] of any matter
 
 
 @wp.struct
@@ -314,6 +315,8 @@ def update_kernel(
             since_arrival,
             since_booster,
         )
+        if not (density > ZERO and energy < HUGE and wp.abs(response.pressure) < HUGE):  # nor if one is not a number
+            report_fault(particles, p, slab, faults)
         matter.density = density
         matter.energy = energy
         matter.pressure = response.pressure

@@ -113,6 +113,12 @@ def place(
 
 
 @wp.func
+def report_fault(particles: Particles, p: int, slab: int, faults: wp.array(dtype=int)):
+    """Say that the run cannot go on because of a particle; of several in a slab, the last one is reported."""
+    wp.atomic_max(faults, slab, particles.index[p] + 1)
+
+
+@wp.func
 def settle(
     particles: Particles,
     p: int,
@@ -126,7 +132,7 @@ def settle(
 ) -> bool:
     """Put a particle in its place, take it out if it left, or report a fault; returns whether it is still there."""
     if after.fault:
-        wp.atomic_max(faults, slab, particles.index[p] + 1)
+        report_fault(particles, p, slab, faults)
         return True
     if after.left_through >= 0:
         tally_outflow(mass, velocity, energy, after.left_through, slab, tallies)

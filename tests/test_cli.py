@@ -96,6 +96,12 @@ MISTAKES = [
     (("run", "two_point", "--solver", "viscosity=1.5"), "solver: viscosity: expected 2 values"),
     (("run", "two_point", "--solver", "order=usf"), "solver: order: expected musl with transfer=damped_flip"),
     (("run", "two_point", "--frames", "1"), "save: frames: expected at least 2"),
+    (("run", "two_point", "--checkpoint-steps", "0"), "save: checkpoint_steps: expected a whole number of at least 1"),
+    (
+        ("run", "two_point", "--checkpoint-minutes", "nan"),
+        "save: checkpoint_minutes: expected a positive number, got nan",
+    ),
+    (("run", "two_point", "--resume", "--set", *COARSE), "resume: expected a checkpoint to go on from, got none in"),
     (("run", "two_point", "--frames", "many"), "argument --frames: invalid int value: 'many'"),
     (("run", "two_point", "--layout", "split"), "argument --layout: invalid choice: 'split'"),
     (("run", "two_point", "--particles-every", "0"), "save: particles_every: expected a whole number of at least 1"),

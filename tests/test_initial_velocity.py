@@ -24,7 +24,7 @@ from warp_mpm.conservation import totals_of
 from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box
 from warp_mpm.scene import Walls
-from warp_mpm.simulation import color_limit
+from warp_mpm.summary import color_limit
 
 VELOCITY = (30.0, -20.0, 10.0)  # [m/s]
 SPEED = float(np.linalg.norm(VELOCITY))

@@ -7,13 +7,10 @@ import pytest
 import warp as wp
 from scenes_for_tests import CELL, OPEN, ROUND_OFF, advance, block, inert_gas, particle_values, start
 
-from warp_mpm import simulation
 from warp_mpm.errors import SimulationError
-from warp_mpm.guards import check_faults
+from warp_mpm.guards import check_state
 from warp_mpm.kernels import motion
 from warp_mpm.kernels.precision import LAST_FRACTION, scalar, vector3
-from warp_mpm.simulation import simulate
-from warp_mpm.state import State
 
 
 @functools.cache
@@ -110,29 +107,15 @@ def test_a_particle_that_leaves_its_reach_stops_the_run(device):
     state.grid.node.assign(values)
     solver.step()
     with pytest.raises(SimulationError) as caught:
-        check_faults(state, 1)
+        check_state(state, 1)
     message = str(caught.value)
     assert "\n" not in message
     assert "block: step 1 at 1.071 us: particle " in message
     assert "charge 'block' (ammonium nitrate)" in message
+    assert "; try a smaller cfl" in message
     cells = particle_values(state)["cell"]
     assert cells.min() >= 0
     assert np.all(cells < (6, 4, 3))
-
-
-def test_a_velocity_that_is_no_number_stops_the_run(device, monkeypatch):
-    """NaN in one particle spreads to its nodes and neighbors: the run ends after the step that shows it."""
-
-    class Spoilt(State):
-        def __init__(self, model):
-            super().__init__(model)
-            velocity = self.values("velocity").copy()
-            velocity[100, 1] = np.nan
-            self.assign("velocity", velocity)
-
-    monkeypatch.setattr(simulation, "State", Spoilt)
-    with pytest.raises(SimulationError, match="step 1 at"):
-        simulate(block((6, 4, 3), end_time=1e-5), device=device, threads=1)
 
 
 def test_a_fast_particle_shortens_the_step(device):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
         ring,
         row,
     )
-    from warp_mpm.errors import InputError, SimulationError
+    from warp_mpm.errors import InputError, SimulationError, Terminated
     from warp_mpm.geometry import Box, Cylinder, Sphere
     from warp_mpm.kernels.eos.ideal_gas import IdealGas
     from warp_mpm.kernels.eos.jwl import JWL
@@ -69,6 +69,7 @@ __all__ = [
     "Sphere",
     "SphereDetonator",
     "StiffenedGas",
+    "Terminated",
     "Transfer",
     "Wall",
     "Walls",
@@ -103,7 +104,7 @@ _HOMES = {
         "ring",
         "row",
     ),
-    "errors": ("InputError", "SimulationError"),
+    "errors": ("InputError", "SimulationError", "Terminated"),
     "geometry": ("Box", "Cylinder", "Sphere"),
     "kernels.eos.ideal_gas": ("IdealGas",),
     "kernels.eos.jwl": ("JWL",),

@@ -1,7 +1,7 @@
 """The command line `warp-mpm`.
 
 A user's mistake is one line on standard error and exit code 2; a run that cannot go on, or a broken bound of `verify`,
-code 1; an interrupt, 130.
+code 1; an interrupt, 130; SIGTERM, 143.
 Modules that take long to import are imported where they are used: `list` and `--help` answer at once.
 """
 
@@ -15,11 +15,11 @@ from typing import Any, NoReturn
 
 from warp_mpm.checks import count, mistake
 from warp_mpm.config import PARTICLE_FIELDS, Layout, Save, SolverConfig
-from warp_mpm.errors import InputError, SimulationError, VerificationError
+from warp_mpm.errors import InputError, SimulationError, Terminated, VerificationError
 from warp_mpm.parameters import annotations_of, from_text
 from warp_mpm.version import VERSION
 
-SUCCESS, FAILURE, MISTAKE, INTERRUPTED = 0, 1, 2, 130
+SUCCESS, FAILURE, MISTAKE, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,8 +36,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _report(str(error), MISTAKE, words)
     except (SimulationError, VerificationError, OSError) as error:
         return _report(str(error), FAILURE, words)
-    except KeyboardInterrupt:
-        return _report("interrupted; the frames written so far are kept", INTERRUPTED, words)
+    except KeyboardInterrupt as error:
+        return _report(str(error) or "interrupted; the frames written so far are kept", INTERRUPTED, words)
+    except Terminated as error:
+        return _report(str(error), TERMINATED, words)
     except Exception as error:
         remedy = "this is a fault of warp_mpm: please report it with what --debug shows"
         return _report(f"{type(error).__name__}: {error}; {remedy}", FAILURE, words)
@@ -77,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("scene", metavar="SCENE", help="a scene file, or a name that 'warp-mpm list' shows")
     run.add_argument("-o", "--output", metavar="DIR", type=Path, help="where to write (default: out/<scene>)")
     _add_settings(run, "--set", "parameters of the scene, e.g. cell_size=6e-3 confinement=free")
+    run.add_argument("--resume", action="store_true", help="go on from the last checkpoint in the output directory")
     _add_saving(run)
     _add_solving(run)
 
@@ -157,6 +160,19 @@ def _add_saving(parser: argparse.ArgumentParser) -> None:
         help="also show in the USD file where the pressure has this value [Pa]",
     )
     parser.add_argument("--usdz", action="store_true", help="also pack the USD file into a .usdz")
+    parser.add_argument(
+        "--checkpoint-steps",
+        metavar="N",
+        type=int,
+        help="a checkpoint, to go on from with --resume, every N steps (default: by the clock alone)",
+    )
+    parser.add_argument(
+        "--checkpoint-minutes",
+        metavar="M",
+        type=float,
+        default=default.checkpoint_minutes,
+        help="and every M minutes (default: %(default)g)",
+    )
 
 
 def _save(options: argparse.Namespace) -> Save:
@@ -172,6 +188,8 @@ def _save(options: argparse.Namespace) -> Save:
         particles_every=options.particles_every,
         isosurface=options.isosurface,
         usdz=options.usdz,
+        checkpoint_steps=options.checkpoint_steps,
+        checkpoint_minutes=options.checkpoint_minutes,
     )
 
 
@@ -246,6 +264,7 @@ def _run(options: argparse.Namespace) -> None:
             device=options.device,
             threads=options.threads,
             progress=progress,
+            resume=options.resume,
         )
     finally:
         progress.close()

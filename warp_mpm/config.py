@@ -98,6 +98,8 @@ class Save:
     particles_every: int = 1  # the USD file has one particle in so many, in creation order
     isosurface: float | None = None  # also show where the field pressure has this value [Pa]
     usdz: bool = False  # also pack the USD file into a .usdz
+    checkpoint_steps: int | None = None  # a checkpoint at least every so many steps; None: by the clock alone
+    checkpoint_minutes: float = 10.0  # and at least every so many minutes
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -111,6 +113,9 @@ class Save:
         count("save: particles_every", self.particles_every)
         if self.isosurface is not None:
             positive("save: isosurface", self.isosurface)
+        if self.checkpoint_steps is not None:
+            count("save: checkpoint_steps", self.checkpoint_steps)
+        positive("save: checkpoint_minutes", self.checkpoint_minutes)
         for name in self.fields:
             if name not in PARTICLE_FIELDS:
                 raise InputError(f"save: fields: expected any of {', '.join(PARTICLE_FIELDS)}, got {name!r}")

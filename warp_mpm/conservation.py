@@ -1,6 +1,8 @@
 """The audit: mass, momentum and energy, with everything that crossed the domain's faces added back."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -61,6 +63,13 @@ class Audit:
         """Largest defect over the largest sum m |v|; None before anything has moved."""
         return self.largest_momentum_defect / self.largest_momentum if self.largest_momentum > 0.0 else None
 
+    @property
+    def clamped_share(self) -> float:
+        """Energy added to particles that would have had less than none, over that of all at the start."""
+        if self._first is None or self._last is None:
+            return 0.0
+        return self._last.clamped_energy / abs(self._energy(self._first))
+
     def add(self, totals: Totals) -> None:
         """Take the totals of a later instant into account."""
         first = self._first = self._first or totals
@@ -78,9 +87,34 @@ class Audit:
         start = self._energy(first)
         self.energy_error = max(self.energy_error, abs(self._energy(totals) - start) / abs(start))
 
+    def saved(self) -> dict[str, np.ndarray]:
+        """Everything that was taken into account so far, for `restore`."""
+        saved: dict[str, np.ndarray] = {}
+        for name, value in vars(self).items():
+            parts = (
+                {f"{name}.{part}": of for part, of in vars(value).items()}
+                if isinstance(value, Totals)
+                else {name: value}
+            )
+            saved |= {part: np.array(of) for part, of in parts.items() if of is not None}
+        return saved
+
+    def restore(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Go on from what `saved` gave."""
+        values = {name: value.item() if value.ndim == 0 else value for name, value in saved.items()}
+        for name in [item.name for item in fields(self) if item.name in values]:
+            setattr(self, name, values[name])
+        self._first, self._last = (_totals(values, name) for name in ("_first", "_last"))
+
     def _energy(self, totals: Totals) -> float:
         inside = totals.kinetic + totals.internal - float(self.gravity @ totals.position)
         return inside + totals.energy_out + totals.ambient_work - totals.clamped_energy
+
+
+def _totals(values: Mapping[str, Any], name: str) -> Totals | None:
+    """The totals among saved values; what was None was not saved."""
+    found: dict[str, Any] = {item.name: values.get(f"{name}.{item.name}") for item in fields(Totals)}
+    return None if found["time"] is None else Totals(**found)
 
 
 def totals_of(solver: Solver) -> Totals:

@@ -1,4 +1,6 @@
-"""The one exception for mistakes a user can make, and the one warning for what a user should know."""
+"""The exceptions that a user may meet: mistakes in the input, runs that cannot go on, runs that were stopped."""
+
+import signal
 
 
 class InputError(ValueError):
@@ -14,3 +16,14 @@ class SimulationError(RuntimeError):
 
 class VerificationError(RuntimeError):
     """A verification problem's bound is broken: one line that names each, what was expected and what came."""
+
+
+class Terminated(SystemExit):
+    """The run was asked to end (SIGTERM) and did so in good order; a script that does not catch it exits with 143."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(128 + signal.SIGTERM)  # as shells have it
+        self.text = text
+
+    def __str__(self) -> str:
+        return self.text

@@ -4,6 +4,8 @@ what is worth keeping of the section plane.
 It is kept on the device and fetched in chunks, so that no step waits for the host.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 import warp as wp
 
@@ -106,6 +108,32 @@ class Recorder:
         self._gauges_taken = len(self._fetched)
         rows = np.concatenate([np.empty((0, self._rows.shape[1]), NUMBER), *(rows for _, rows in fetched)])
         return np.concatenate([np.empty(0), *(time for time, _ in fetched)]), self._gauge_lanes(rows)
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """Everything recorded so far, for `restore`."""
+        self._fetch()
+        peaks_taken = sum(len(time) for time, _ in self._fetched[: self._peaks_taken])
+        return {
+            "time": np.concatenate([time for time, _ in self._fetched]),
+            "rows": np.concatenate([rows for _, rows in self._fetched]),
+            "peaks_taken": np.array(peaks_taken),
+            **{f"section.{name}": values for name, values in self._section.saved().items()},
+        }
+
+    def restore(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Go on from what `saved` gave. The gauges' part of it counts as not yet taken.
+
+        Raises:
+            KeyError, ValueError: it is not of this scene.
+        """
+        time, rows, taken = saved["time"], saved["rows"], int(saved["peaks_taken"])
+        if time.shape != rows.shape[:1] or rows.shape[1:] != self._rows.shape[1:] or not 0 < taken <= len(time):
+            raise ValueError(f"record: {time.shape} times, rows {rows.shape}, {taken} taken")
+        cuts = [part for part in (slice(0, taken), slice(taken, None)) if len(time[part])]
+        self._fetched = [(time[part].astype(np.float64), rows[part].astype(NUMBER)) for part in cuts]
+        self._peaks_taken = 1
+        self._first_step = len(time)
+        self._section.restore({name: saved[f"section.{name}"] for name in self._section.saved()})
 
     def result(self) -> StepRecord:
         """Everything recorded so far."""

@@ -1,5 +1,7 @@
 """The field pressure on the scene's section plane: now, and what of its past is worth keeping."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import warp as wp
 
@@ -37,17 +39,35 @@ class SectionRecorder:
         first, second = scene.section.in_plane
         corner = sum(strides) + below * strides[scene.section.axis]  # the ghosts come before the domain's first node
         shape = (scene.domain.cells[first] + 1, scene.domain.cells[second] + 1)
-        last = wp.zeros(shape, dtype=scalar, device=state.device)
+        self._last = wp.zeros(shape, dtype=scalar, device=state.device)
         self._peak = wp.zeros(shape, dtype=scalar, device=state.device)
         self._arrival = wp.full(shape, NEVER, dtype=scalar, device=state.device)
         plane = [corner, strides[first], strides[second], strides[scene.section.axis], share]
         limit = np.inf if threshold is None else threshold
-        inputs = [grid, state.clock, *plane, limit, last, self._peak, self._arrival]
+        inputs = [grid, state.clock, *plane, limit, self._last, self._peak, self._arrival]
         self._launch = wp.launch(record_section, shape, inputs=inputs, device=state.device, record_cmd=True)
 
     def record(self) -> None:
         """Take the state as it is now into account: once before the first step, then after each."""
         self._launch.launch()
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """Everything kept so far, for `restore`."""
+        return {name: array.numpy().copy() for name, array in self._arrays().items()}
+
+    def restore(self, saved: Mapping[str, np.ndarray]) -> None:
+        """Go on from what `saved` gave.
+
+        Raises:
+            KeyError, ValueError: it is not of this scene.
+        """
+        for name, array in self._arrays().items():
+            if saved[name].shape != array.shape:
+                raise ValueError(f"section: {name}: {saved[name].shape} instead of {array.shape}")
+            array.assign(saved[name])
+
+    def _arrays(self) -> dict[str, wp.array]:
+        return {"last": self._last, "peak": self._peak, "arrival": self._arrival}
 
     def result(self) -> SectionRecord:
         """What was kept so far."""

@@ -2,8 +2,8 @@
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, fields
 from enum import Enum
 from pathlib import Path
@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from warp_mpm.checkpoint import Checkpoints, part, restore_solver, saved_solver
 from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, totals_of
-from warp_mpm.errors import SimulationError
-from warp_mpm.guards import check_faults, check_memory, writable_directory
+from warp_mpm.errors import SimulationError, Terminated
+from warp_mpm.fingerprint import fingerprints
+from warp_mpm.guards import check_memory, check_state, clamp_warnings, writable_directory
 from warp_mpm.isosurface import pressure_isosurface
 from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.launch import Launcher, find_device
@@ -28,7 +30,8 @@ from warp_mpm.scene import Scene, Wall
 from warp_mpm.section import section_pressure
 from warp_mpm.solver import Solver
 from warp_mpm.state import State
-from warp_mpm.summary import figures_of_merit, lit_explosive
+from warp_mpm.stopping import StopRequest
+from warp_mpm.summary import figures_of_merit
 from warp_mpm.version import VERSION
 
 GROWTH = 1.1  # of the time step, at most; as in kernels.reduce
@@ -57,8 +60,12 @@ def simulate(
     device: str | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
+    resume: bool = False,
 ) -> Result:
     """Simulate a scene to its end time.
+
+    Asked to stop by SIGINT (Ctrl-C) or SIGTERM, it ends the step, saves what there is with a checkpoint, and raises
+    KeyboardInterrupt or `Terminated`; asked twice, it stops at once.
 
     Args:
         scene: what is simulated.
@@ -68,22 +75,28 @@ def simulate(
         device: "cpu", "cuda:0", ...; a GPU if there is one.
         threads: on a CPU; one a core.
         progress: told how far the run is.
+        resume: go on from the last checkpoint in `output`, as if the run had never stopped.
 
     Raises:
-        InputError: unknown device, too little memory, or an output directory that cannot be written.
+        InputError: unknown device, too little memory, an output directory that cannot be written, or to resume there
+            is no checkpoint, or one of something else.
         SimulationError: the run cannot go on.
     """
-    begin = time.perf_counter()
-    run = _Run(scene, config or SolverConfig(), save or Save(), output, device, threads, progress or Silent())
+    run = _Run(scene, config or SolverConfig(), save or Save(), output, device, threads, progress or Silent(), resume)
     try:
         run.to_the_end()
-    except (KeyboardInterrupt, SimulationError) as error:
-        if run.history:  # before the first frame there is nothing to sum up
-            run.finish(begin, "interrupted" if isinstance(error, KeyboardInterrupt) else f"failed: {error}")
+    except (KeyboardInterrupt, Terminated):
+        run.sum_up("interrupted")
         raise
+    except SimulationError as error:
+        with suppress(SimulationError):  # a disk that was full may still be
+            run.sum_up(f"failed: {error}")
+        raise SimulationError(f"{error}{run.checkpoints.remedy()}") from error
     finally:
         run.launcher.close()
-    return run.finish(begin, "complete")
+    result = run.finish("complete")
+    run.checkpoints.remove()
+    return result
 
 
 class _Run:
@@ -98,14 +111,18 @@ class _Run:
         device: str | None,
         threads: int | None,
         progress: Progress,
+        resume: bool,
     ) -> None:
         self.scene = scene
         self.save = save
         self.progress = progress
+        self.begin = time.perf_counter()  # [s]; of a resumed run, as if it had gone on all the time
         self.launcher = Launcher(find_device(device), threads)
         self.output = None if output is None else writable_directory(Path(output))
         self.model = build_model(scene, config, self.launcher.device)
         check_memory(self.model)
+        self.checkpoints = Checkpoints(self.output, self._identity(config), save)
+        saved = self.checkpoints.read() if resume else None
         progress.message(
             f"{scene.name}: {scene.particle_count:,} particles in {math.prod(scene.domain.cells):,} cells on "
             f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}, in {PRECISION} precision; "
@@ -115,32 +132,50 @@ class _Run:
         self.solver = Solver(self.model, self.state, self.launcher)
         self.recorder = Recorder(self.state)
         self.audit = Audit(np.array(scene.gravity), scene.mass)
-        self.history: list[dict[str, float]] = []
+        self.frame_times = np.linspace(0.0, scene.end_time, save.frames)
+        self.picture_times = sorted(scene.picture_times)
+        self.history: list[dict[str, float]] = []  # a row for each frame written
         self.pictures: list[SectionPicture] = []
+        self.warnings: list[str] = []
         self.solver_seconds = 0.0
         self.steps = 0
         self.audited_step = 0
+        if saved is not None:
+            self._restore(*saved)
 
     def to_the_end(self) -> None:
         """Step to the end time; save frames and pictures at the first step at or past their instants."""
-        scene, end = self.scene, self.scene.end_time
-        frames = np.linspace(0.0, end, self.save.frames)
-        pictures = sorted(scene.picture_times)
-        self.recorder.record()
-        with self._writers() as write:
-            next_frame = self._save_due(write, frames, 0, pictures, 0.0)
+        end = self.scene.end_time
+        if not self.history:
+            self.checkpoints.remove()  # of an earlier run
+            self.recorder.record()
+        with self._files() as write:
+            now = float(self.state.clock_values()["time"])
+            self._save_due(write, now)
             self._write_start()
-            now = 0.0
-            while now < end:
-                now = self._advance(min([frames[next_frame], *pictures[:1]]))
-                next_frame = self._save_due(write, frames, next_frame, pictures, now)
-                peak = self.history[-1]["peak_pressure_pa"]
-                self.progress.update(now, end, self.steps, f"peak {peak / 1e9:.2f} GPa")
+            with StopRequest() as stop:
+                while now < end and stop.signal is None:
+                    now = self._advance(min(self._instants_to_come()))
+                    self._save_due(write, now)
+                    peak = self.history[-1]["peak_pressure_pa"]
+                    self.progress.update(now, end, self.steps, f"peak {peak / 1e9:.2f} GPa")
+                    if now < end and self.checkpoints.due(self.steps):
+                        self._write_checkpoint()
+            if now < end:
+                self._write_checkpoint()
+                if self.history[-1]["step"] < self.steps:  # the state at the stop; who goes on writes this frame anew
+                    self._save_frames(write, now, 1)
+                raise stop.exception(f"interrupted at {now * 1e6:.3f} us{self.checkpoints.remedy()}")
 
-    def finish(self, begin: float, status: str) -> Result:
+    def sum_up(self, status: str) -> None:
+        """Sum up a run that has stopped before its end; before the first frame there is nothing to sum up."""
+        if self.history:
+            self.finish(status)
+
+    def finish(self, status: str) -> Result:
         """Sum up what there is, and draw it."""
         record = self.recorder.result()
-        summary = {"status": status, **self._summary(record, time.perf_counter() - begin)}
+        summary = {"status": status, **self._summary(record)}
         if self.output is not None:
             from warp_mpm.output.steps import write_steps
             from warp_mpm.output.tables import write_summary
@@ -150,7 +185,7 @@ class _Run:
             if self.save.figures:
                 self.progress.message("drawing figures")
                 summary["warnings"] += self._draw()
-            summary["wall_s"] = time.perf_counter() - begin
+            summary["wall_s"] = time.perf_counter() - self.begin
             write_summary(self.output / SUMMARY, summary)
         return Result(summary, self.history, record, tuple(self.pictures), self.state, self.output)
 
@@ -163,7 +198,7 @@ class _Run:
             self.recorder.record()
             self.steps += 1
         clock = self.state.clock_values()
-        check_faults(self.state, self.steps)
+        check_state(self.state, self.steps)
         self.solver.sort_if_due()
         if self.steps - self.audited_step >= STEPS_BETWEEN_AUDITS:
             self._audit()
@@ -180,21 +215,71 @@ class _Run:
         surely = math.floor(math.log1p((GROWTH - 1.0) * left / (GROWTH * dt)) / math.log(GROWTH))
         return max(1, min(surely, STEPS_AT_ONCE))
 
-    def _save_due(self, write: Any, frames: np.ndarray, next_frame: int, pictures: list[float], now: float) -> int:
-        """Save the frames and pictures whose instants have come; returns the next frame."""
-        while pictures and now >= pictures[0]:
-            pictures.pop(0)
+    def _instants_to_come(self) -> list[float]:
+        """The next frame's and the next picture's [s]."""
+        frames, pictures = self.frame_times[len(self.history) :], self.picture_times[len(self.pictures) :]
+        return [*frames[:1], *pictures[:1]]
+
+    def _save_due(self, write: Any, now: float) -> None:
+        """Save the frames and pictures whose instants have come."""
+        while len(self.pictures) < np.searchsorted(self.picture_times, now, side="right"):
             self.pictures.append(SectionPicture(now, section_pressure(self.state)))
-        if next_frame < len(frames) and now >= frames[next_frame]:
-            totals = self._audit()
-            pressure = self.state.field("pressure")
-            inside = self.state.field("mass") > 0.0
-            row = self._history_row(totals, pressure[inside])
-            while next_frame < len(frames) and now >= frames[next_frame]:
-                self.history.append(row)
-                write(next_frame, now, pressure, inside, row)
-                next_frame += 1
-        return next_frame
+        self._save_frames(write, now, int(np.searchsorted(self.frame_times, now, side="right")) - len(self.history))
+
+    def _save_frames(self, write: Any, now: float, count: int) -> None:
+        """Save the present state as the next `count` frames."""
+        if count == 0:
+            return
+        totals = self._audit()
+        pressure = self.state.field("pressure")
+        inside = self.state.field("mass") > 0.0
+        row = self._history_row(totals, pressure[inside])
+        for index in range(len(self.history), len(self.history) + count):
+            self.history.append(row)
+            if write is not None:
+                write(self._frame(index, now, pressure, inside), row)
+
+    def _write_checkpoint(self) -> None:
+        """Save all that it takes to go on from here."""
+        values = {
+            "steps": self.steps,
+            "audited_step": self.audited_step,
+            "solver_seconds": self.solver_seconds,
+            "wall_seconds": time.perf_counter() - self.begin,
+            "history": self.history,
+        }
+        parts = {"record": self.recorder.saved(), "audit": self.audit.saved()}
+        arrays = {f"{part}.{name}": array for part, saved in parts.items() for name, array in saved.items()}
+        if self.pictures:
+            arrays["pictures.time"] = np.array([picture.time for picture in self.pictures])
+            arrays["pictures.pressure"] = np.stack([picture.pressure for picture in self.pictures])
+        self.checkpoints.write(self.steps, values, {**saved_solver(self.solver), **arrays})
+
+    def _restore(self, values: Mapping[str, Any], arrays: Mapping[str, np.ndarray], warnings: list[str]) -> None:
+        """Go on from a checkpoint.
+
+        Raises:
+            InputError: it does not fit.
+        """
+        self.warnings = warnings
+        with self.checkpoints.must_fit():
+            restore_solver(self.solver, arrays)
+            self.recorder.restore(part(arrays, "record"))
+            self.audit.restore(part(arrays, "audit"))
+            pictures = zip(arrays.get("pictures.time", ()), arrays.get("pictures.pressure", ()), strict=True)
+            self.pictures = [SectionPicture(float(time), pressure) for time, pressure in pictures]
+            self.history = values["history"]
+            if not self.history:
+                raise ValueError("no frames")
+            self.steps, self.audited_step = values["steps"], values["audited_step"]
+            self.solver_seconds = values["solver_seconds"]
+            self.begin -= values["wall_seconds"]
+        self.progress.message(f"going on from {self.checkpoints.latest}, step {self.steps}")
+
+    def _identity(self, config: SolverConfig) -> dict[str, str]:
+        """What a checkpoint of this run goes on with, and none else."""
+        device = "a GPU" if self.launcher.device.is_cuda else "a CPU"
+        return {**fingerprints(self.scene, config, self.save), "device": device, "precision": PRECISION}
 
     def _audit(self) -> Totals:
         """The present totals, compared with those at the start."""
@@ -209,57 +294,13 @@ class _Run:
         spread = float(pressure.std()) / mean if mean > 0.0 else 0.0
         return history_row(totals, self.steps, float(clock["dt"]), self.recorder.take_peak(), spread)
 
-    @contextmanager
-    def _writers(self) -> Iterator[Any]:
-        """A function that writes a frame and a row of the history; files are closed whatever way the run ends."""
+    def _files(self) -> AbstractContextManager[Any]:
+        """A function that writes a frame and a row of the history, or None; closed whatever way the run ends."""
         if self.output is None:
-            yield lambda *_: None
-            return
-        from warp_mpm.output.tables import TableWriter
-        from warp_mpm.output.usd import UsdWriter
+            return nullcontext()
+        from warp_mpm.run_files import run_files
 
-        with ExitStack() as stack:
-            usd = stack.enter_context(
-                UsdWriter(
-                    self.output / f"{self.scene.name}.usdc",
-                    self.scene,
-                    pressure_range=(0.0, color_limit(self.scene)),
-                    frames=self.save.frames,
-                    fields=self.save.fields,
-                    particles_every=self.save.particles_every,
-                    isosurface=self.save.isosurface,
-                    layout=self.save.layout,
-                    usdz=self.save.usdz,
-                )
-            )
-            write_gauges = self._gauge_writer(self.output / "gauges.csv", stack)
-            history: list[TableWriter] = []
-
-            def write(index: int, now: float, pressure: np.ndarray, inside: np.ndarray, row: dict[str, float]) -> None:
-                usd.write(self._frame(index, now, pressure, inside))  # before its row: what has a row can be shown
-                if not history:
-                    path = self.output / "history.csv" if self.output else Path()
-                    history.append(stack.enter_context(TableWriter(path, list(row))))
-                history[0].write(row)
-                write_gauges()
-
-            yield write
-
-    def _gauge_writer(self, path: Path, stack: ExitStack) -> Callable[[], None]:
-        """A function that adds to gauges.csv what was recorded since it was last called, as does the end of `stack`."""
-        from warp_mpm.output.tables import TableWriter, gauge_columns, gauge_rows
-
-        gauges = self.scene.gauges
-        if not gauges:
-            path.unlink(missing_ok=True)  # what an earlier run left
-            return lambda: None
-        table = stack.enter_context(TableWriter(path, gauge_columns(gauges)))
-
-        def write() -> None:
-            table.extend(gauge_rows(gauges, *self.recorder.take_gauges()))
-
-        stack.callback(write)
-        return write
+        return run_files(self.output, self.scene, self.save, self.recorder, self.history)
 
     def _frame(self, index: int, now: float, pressure: np.ndarray, inside: np.ndarray) -> Frame:
         sources = {"particleVelocity": "velocity"}
@@ -298,14 +339,14 @@ class _Run:
             "precision": PRECISION,
         }
 
-    def _summary(self, record: StepRecord, wall: float) -> dict[str, Any]:
+    def _summary(self, record: StepRecord) -> dict[str, Any]:
         clock = self.state.clock_values()
         final = self.history[-1]
         return {
             **self._given(),
             "steps": self.steps,
             "end_time_s": float(clock["time"]),
-            "wall_s": wall,
+            "wall_s": time.perf_counter() - self.begin,
             "solver_wall_s": self.solver_seconds,
             "ns_per_particle_step": 1e9 * self.solver_seconds / max(1, self.steps * self.scene.particle_count),
             **figures_of_merit(self.scene, record),
@@ -321,7 +362,7 @@ class _Run:
             },
             "pressure_spread": final["pressure_spread"],
             "particle_volume_error": self._volume_error(),
-            "warnings": [*self.scene.warnings, *self._frame_warnings()],
+            "warnings": [*self.scene.warnings, *self.warnings, *self._frame_warnings(), *clamp_warnings(self.audit)],
         }
 
     def _volume_error(self) -> float | None:
@@ -334,17 +375,6 @@ class _Run:
         if self.save.frames <= self.steps + 1:
             return []
         return [f"frames: {self.save.frames} asked for, but only {self.steps} steps taken: some frames are repeated"]
-
-
-def color_limit(scene: Scene) -> float:
-    """Pressure of the last colour [Pa]: 1.6 p_CJ shows fronts and collisions.
-
-    Without explosive, the energy density rho (e + |v|^2 / 2) of the charge that has most of it at the start.
-    """
-    material = lit_explosive(scene)
-    if material is not None and material.cj is not None:
-        return 1.6 * material.cj.pressure
-    return max(c.material.density * (c.material.specific_energy + 0.5 * c.greatest_speed**2) for c in scene.charges)
 
 
 def _solver_values(model: Model) -> dict[str, Any]:

@@ -35,6 +35,7 @@ class Solver:
         self.state = state
         self.launcher = launcher
         self.steps_since_sort = 0
+        self.thin = False  # whether there were very few particles to a node when they were last sorted
         self._graph: wp.Graph | None = None
         self._record_clock()
         self._record_ranges()
@@ -97,10 +98,16 @@ class Solver:
 
     def sort(self) -> None:
         """Sort the particles, and record the launches for their new ranges."""
-        self.state.ranges = self.state.sort()
+        ranges = self.state.sort()
         self.state.reset_drift()
+        self.take_up(ranges, 0, self._gas_is_thin())
+
+    def take_up(self, ranges: np.ndarray, steps_since_sort: int, thin: bool) -> None:
+        """Record the launches for particles that lie otherwise in memory: just sorted, or those of a checkpoint."""
+        self.state.ranges = ranges
+        self.steps_since_sort = steps_since_sort
+        self.thin = thin
         self._record_ranges()
-        self.steps_since_sort = 0
 
     def audit(self) -> tuple[np.ndarray, float]:
         """Sums over the particles (`kernels.reduce` names the lanes), and the mass on the grid [kg]."""
@@ -185,7 +192,7 @@ class Solver:
         ambient = model.ambient_pressure
         blend = model.pic_share > 0.0
         musl, usf = order is Order.MUSL, order is Order.USF
-        thin = self._gas_is_thin()
+        thin = self.thin
 
         def scatter(momentum: bool, force: bool) -> list[Task]:
             kernel = transfer.scatter_kernel(shape, momentum, force, model.affine, model.damped, thin)

@@ -49,6 +49,17 @@ def arrival_threshold(scene: Scene) -> float | None:
     return None if material is None or material.cj is None else ARRIVAL_SHARE * material.cj.pressure
 
 
+def color_limit(scene: Scene) -> float:
+    """Pressure of the last colour [Pa]: 1.6 p_CJ shows fronts and collisions.
+
+    Without explosive, the energy density rho (e + |v|^2 / 2) of the charge that has most of it at the start.
+    """
+    material = lit_explosive(scene)
+    if material is not None and material.cj is not None:
+        return 1.6 * material.cj.pressure
+    return max(c.material.density * (c.material.specific_energy + 0.5 * c.greatest_speed**2) for c in scene.charges)
+
+
 def ideal_arrival(scene: Scene, points: np.ndarray, speed: float) -> np.ndarray:
     """Arrival times (n,) [s] of straight waves from the scene's detonators at points (n, 3)."""
     return straight_arrival(scene.detonators, points, speed)

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import math
 import re
 from collections.abc import Iterable, Iterator
@@ -14,9 +13,10 @@ from pxr import Usd, UsdGeom
 from rich.console import Console
 
 from warp_mpm.errors import InputError
+from warp_mpm.output.checkpoint import checkpoint_files
 from warp_mpm.output.tables import GAUGE_COLUMNS, print_summary
 from warp_mpm.output.usd_reading import frame_times, open_stage, usd_file
-from warp_mpm.run_directory import usd_files
+from warp_mpm.run_directory import Run, usd_files
 
 MICROSECOND = 1e-6  # [s]
 COMPLETE = "complete"  # status of a run that came to its end
@@ -58,16 +58,15 @@ def _describe_run(directory: Path) -> str:
 
 
 def _summary_text(path: Path) -> str:
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"info: {path}: expected JSON, got something else ({error}); run the scene again") from error
+    summary = Run(path.parent, None).summary
     status = summary.get("status", COMPLETE)
+    checkpoints = checkpoint_files(path.parent)
+    resume = f"; --resume goes on from {checkpoints[0].name}" if checkpoints else ""
     if status == RUNNING:
-        return f"{summary.get('scene', path.parent)}: the run goes on, or was killed"
+        return f"{summary.get('scene', path.parent)}: the run goes on, or was killed{resume}"
     text = io.StringIO()
     print_summary(summary, Console(file=text, width=WIDTH))
-    ended = "" if status == COMPLETE else f"\nthe run did not come to its end: {status}"
+    ended = "" if status == COMPLETE else f"\nthe run did not come to its end: {status}{resume}"
     return text.getvalue().rstrip() + ended
 
 
@@ -75,8 +74,11 @@ def _table_note(file: Path) -> str:
     """Rows of a table of a run, the times they span, and the gauges that have columns in it."""
     if file.suffix != ".csv":
         return ""
-    with file.open(newline="", encoding="utf-8") as lines:
-        header, *rows = [*csv.reader(lines)] or [[]]
+    try:
+        with file.open(newline="", encoding="utf-8") as lines:
+            header, *rows = [*csv.reader(lines)] or [[]]
+    except (ValueError, csv.Error):
+        return "not a table"
     rows = [row for row in rows if len(row) == len(header)]  # a killed run may have left part of one
     if header[:1] != ["time_s"] or not rows:
         return f"{len(rows)} rows"

@@ -37,19 +37,20 @@ PLACE_COLUMNS = 3
 class TableWriter:
     """A CSV file in the making; rows are on disk when `write` or `extend` returns."""
 
-    def __init__(self, path: str | Path, columns: Sequence[str]) -> None:
-        """Start the file with its header.
+    def __init__(self, path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[Any]] = ()) -> None:
+        """Start the file with its header and some rows, in the order of the columns; until then an older one stays.
 
         Raises:
             SimulationError: the file system refuses.
         """
         self._path = Path(path)
         self._columns = tuple(columns)
+        with whole_file(self._path) as part:
+            part.write_bytes(_csv([self._columns, *rows]).encode())
         try:
-            self._file = self._path.open("w", newline="", encoding="utf-8")
+            self._file = self._path.open("a", newline="", encoding="utf-8")
         except OSError as error:
             raise write_error(self._path, error) from error
-        self.extend([self._columns])
 
     def __enter__(self) -> "TableWriter":
         """The writer itself."""
@@ -66,8 +67,7 @@ class TableWriter:
             KeyError: a column is missing.
             SimulationError: the disk is full or refuses.
         """
-        values = [_plain(row[name]) for name in self._columns]
-        self.extend([["" if value is None else value for value in values]])
+        self.extend([row_values(row, self._columns)])
 
     def extend(self, rows: Iterable[Sequence[Any]]) -> None:
         """Add rows whose values are in the order of the columns, and are written as they are.
@@ -75,10 +75,8 @@ class TableWriter:
         Raises:
             SimulationError: the disk is full or refuses.
         """
-        text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerows(rows)
         try:
-            self._file.write(text.getvalue())
+            self._file.write(_csv(rows))
             self._file.flush()
         except OSError as error:
             raise write_error(self._path, error) from error
@@ -86,6 +84,22 @@ class TableWriter:
     def close(self) -> None:
         """Close the file. May be called twice."""
         self._file.close()
+
+
+def row_values(row: Mapping[str, Any], columns: Iterable[str]) -> list[Any]:
+    """The row's values in the order of the columns; numbers as they read back exactly, "" for what is not finite.
+
+    Raises:
+        KeyError: a column is missing.
+    """
+    values = [_plain(row[name]) for name in columns]
+    return ["" if value is None else value for value in values]
+
+
+def _csv(rows: Iterable[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def gauge_columns(gauges: Sequence[Gauge]) -> list[str]:

@@ -16,6 +16,7 @@ from typing import Any
 
 from pxr import Gf, Sdf, Tf, Vt
 
+from warp_mpm.checks import mistake
 from warp_mpm.config import Layout
 from warp_mpm.output.frame import Frame
 from warp_mpm.output.usd_frame import FrameSampler
@@ -45,6 +46,7 @@ class UsdWriter:
         isosurface: float | None = None,
         layout: Layout = Layout.AUTO,
         usdz: bool = False,
+        kept: int = 0,
     ) -> None:
         """Write the parts that do not change, and remove what an earlier run left under the same names.
 
@@ -58,9 +60,11 @@ class UsdWriter:
             isosurface: pressure of the surface to show [Pa]; frames need to have it.
             layout: whether the frames become one file.
             usdz: also pack the result into `<name>.usdz`.
+            kept: the first so many frames of that earlier run stay: it is this run that goes on.
 
         Raises:
             SimulationError: the file system refuses.
+            InputError: one of the frames to keep is not there.
         """
         self._path = Path(path).with_suffix(".usdc")
         self._root = self._path.with_suffix(".usda")
@@ -74,15 +78,7 @@ class UsdWriter:
         self._indices: list[int] = []
         self._result: Path | None = None
         self._static = _static(self._contents)
-        try:
-            self._remove_working_files()
-            for old in (self._path, self._package):
-                old.unlink(missing_ok=True)
-            self._clips.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise write_error(self._path, error) from error
-        _export(self._static, self._clips / STATIC)
-        _export(_manifest(self._sampler.types), self._clips / MANIFEST)
+        self._start(kept)
 
     def __enter__(self) -> "UsdWriter":
         """The writer itself."""
@@ -99,11 +95,7 @@ class UsdWriter:
             SimulationError: the disk is full or refuses. The frames before stay readable.
             ValueError: an array does not have one entry per particle, or per node of the section.
         """
-        clip = Sdf.Layer.CreateAnonymous(".usdc")
-        for path, value in self._sampler.samples(frame).items():
-            Sdf.JustCreatePrimAttributeInLayer(clip, path, self._sampler.types[path])
-            clip.SetTimeSample(path, float(frame.index), value)
-        _export(clip, self._clip(frame.index))
+        self._write_clip(frame.index, self._sampler.samples(frame))
         self._indices.append(frame.index)
         _export(self._root_layer(), self._root)
 
@@ -186,6 +178,48 @@ class UsdWriter:
         finally:
             del merged  # an error keeps the variables of this function, and USD allows one layer of a name
 
+    def _start(self, kept: int) -> None:
+        """Write what does not change. Frames that are kept can be opened all the time; everything else goes."""
+        try:
+            if kept:
+                self._take_up(kept)
+            else:
+                self._remove_working_files()
+            self._clips.mkdir(parents=True, exist_ok=True)
+            _export(self._static, self._clips / STATIC)
+            _export(_manifest(self._sampler.types), self._clips / MANIFEST)
+            if kept:
+                _export(self._root_layer(), self._root)
+                self._remove_working_files(kept)
+            for old in (self._path, self._package):
+                old.unlink(missing_ok=True)
+        except OSError as error:
+            raise write_error(self._path, error) from error
+
+    def _take_up(self, kept: int) -> None:
+        """Go on after the first frames of a run; those that have been merged already become clips again."""
+        self._indices = list(range(kept))
+        missing = [index for index in self._indices if not self._clip(index).exists()]
+        if not missing:
+            return
+        self._clips.mkdir(exist_ok=True)
+        with _errors_of_usd():
+            merged = Sdf.Layer.OpenAsAnonymous(str(self._path)) if self._path.exists() else None
+            for index in missing:
+                samples = {path: merged and merged.QueryTimeSample(path, float(index)) for path in self._sampler.types}
+                if any(value is None for value in samples.values()):
+                    expected, got = f"the {kept} frames that were saved before the checkpoint", f"no frame {index}"
+                    raise mistake(str(self._path.parent), expected, got, "start anew, without --resume")
+                self._write_clip(index, samples)
+
+    def _write_clip(self, index: int, samples: Mapping[str, Any]) -> None:
+        """Write the value of every animated attribute in a frame, by path."""
+        clip = Sdf.Layer.CreateAnonymous(".usdc")
+        for path, value in samples.items():
+            Sdf.JustCreatePrimAttributeInLayer(clip, path, self._sampler.types[path])
+            clip.SetTimeSample(path, float(index), value)
+        _export(clip, self._clip(index))
+
     def _files(self, result: Path) -> list[Path]:
         """The result and all that it needs."""
         if result == self._path:
@@ -199,16 +233,22 @@ class UsdWriter:
     def _clip(self, index: int) -> Path:
         return self._clips / f"frame_{index:05d}.usdc"
 
-    def _remove_working_files(self) -> None:
+    def _remove_working_files(self, kept: int = 0) -> None:
         """Remove the root layer first: without it the clips are just files, without them it would be a broken stage.
 
         A killed run leaves unfinished files too, `<name>.part.` and then a suffix or some letters that USD makes up.
+        With `kept` frames, what plays them stays.
         """
-        self._root.unlink(missing_ok=True)
+        stay = (
+            {self._clips / name for name in (STATIC, MANIFEST)} | set(map(self._clip, range(kept))) if kept else set()
+        )
+        if not kept:
+            self._root.unlink(missing_ok=True)
         files = [*self._path.parent.glob(f"{escape(self._path.stem)}.part.*")]
         files += [file for pattern in ("frame_*", "static.*", "manifest.*") for file in self._clips.glob(pattern)]
         for file in files:
-            file.unlink(missing_ok=True)
+            if file not in stay:
+                file.unlink(missing_ok=True)
         if self._clips.is_dir() and not any(self._clips.iterdir()):
             self._clips.rmdir()
 
