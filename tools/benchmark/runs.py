@@ -7,7 +7,7 @@ import numpy as np
 import warp_mpm as mpm
 from benchmark.timing import timed
 from warp_mpm.conservation import totals_of
-from warp_mpm.guards import check_faults, check_memory
+from warp_mpm.guards import check_memory, check_state
 from warp_mpm.launch import Launcher
 from warp_mpm.materials import ammonium_nitrate
 from warp_mpm.model import build_model
@@ -66,7 +66,7 @@ def advance(solver: Solver, steps: int) -> None:
     for _ in range(steps):
         solver.step()
         solver.sort_if_due()
-    check_faults(solver.state, steps)
+    check_state(solver.state, steps)
 
 
 def advance_to(solver: Solver, instant: float) -> tuple[float, int]:
