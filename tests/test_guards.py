@@ -23,7 +23,7 @@ from warp_mpm.simulation import simulate
 from warp_mpm.state import State
 
 SPOILT = {
-    "velocity": (np.nan, "got nan kg/m3"),  # it spreads to its nodes and neighbors
+    "velocity": (np.nan, "got nan (kg/m3|J/kg)"),  # it spreads to its nodes and neighbors, of which one is named
     "energy": (np.nan, "expected a finite energy, got nan J/kg"),
     "density": (-500.0, "expected a positive density, got -"),
 }
