@@ -13,13 +13,13 @@ from warp_mpm.checks import mistake
 from warp_mpm.output.description import SceneDescription, description_from_json
 from warp_mpm.output.frame import SectionPicture, StepRecord
 from warp_mpm.output.steps import read_steps
+from warp_mpm.output.usd_files import USD_SUFFIXES, usd_files
 
 if TYPE_CHECKING:  # the reader of frames needs pxr
     from warp_mpm.output.saved_frames import Frames
 
 SUMMARY, HISTORY, STEPS, GAUGES = "summary.json", "history.csv", "steps.npz", "gauges.csv"
 FIGURES = "figures"  # directory
-USD_SUFFIXES = (".usdc", ".usda", ".usdz", ".usd")  # in the order in which they are looked for
 
 
 def load(path: str | Path) -> "Run":
@@ -145,9 +145,3 @@ class Run:
             ) from error
         columns = np.array(values, dtype=np.float64).reshape(-1, len(header)).T
         return dict(zip(header, columns, strict=True))
-
-
-def usd_files(directory: Path) -> list[Path]:
-    """The whole USD files of a directory, a merged one first; not what a killed run left half written."""
-    files = [file for suffix in USD_SUFFIXES for file in sorted(directory.glob(f"*{suffix}"))]
-    return [file for file in files if not file.stem.endswith(".part")]

@@ -194,9 +194,9 @@ def _allocate_grid(model: Model) -> Grid:
     total = counts[0] * counts[1] * counts[2]
     grid = Grid()
     grid.node = _sparse_zeros(total, vector8, model.device)
-    grid.field = _sparse_zeros(total + 1, vector2, model.device)  # rows are written four nodes at a time
+    grid.field = _sparse_zeros(total + 1, vector2, model.device)  # see `kernels/rows.py`: one node to spare
     grid.content = _sparse_zeros(total, vector2, model.device)
-    grid.reprojected = _sparse_zeros(total + 1, vector4, model.device)
+    grid.reprojected = _sparse_zeros(total + 1, vector4, model.device)  # likewise
     grid.kick = _sparse_zeros(total if model.sharpened else 0, vector8, model.device)
     blocks = [-(-n // EDGE) for n in counts]
     grid.stamps = wp.full(blocks[0] * blocks[1] * blocks[2], NO_STEP, dtype=int, device=model.device)

@@ -15,8 +15,9 @@ from rich.console import Console
 from warp_mpm.errors import InputError
 from warp_mpm.output.checkpoint import checkpoint_files
 from warp_mpm.output.tables import GAUGE_COLUMNS, print_summary
+from warp_mpm.output.usd_files import usd_files
 from warp_mpm.output.usd_reading import frame_times, open_stage, usd_file
-from warp_mpm.run_directory import Run, usd_files
+from warp_mpm.run_directory import Run
 
 MICROSECOND = 1e-6  # [s]
 COMPLETE = "complete"  # status of a run that came to its end

@@ -7,7 +7,7 @@ from pxr import Tf, Usd
 
 from warp_mpm.checks import mistake
 from warp_mpm.errors import InputError
-from warp_mpm.run_directory import usd_files
+from warp_mpm.output.usd_files import usd_files
 
 
 def usd_file(where: str, path: Path) -> Path:
