@@ -253,13 +253,18 @@ def update_kernel(
         matter = particles.matter[p]
         position = particles.position[p]
         step = deform(grid, now, position, motion, matter, half_width)
+        gained = step.energy
         if wp.static(damped):
-            motion.velocity = at_rest_if_slow(motion.velocity + step.damping)
+            velocity = at_rest_if_slow(motion.velocity + step.damping)
+            # What rounding adds to the velocity it takes from the energy: cold fast gas would be heated otherwise by a
+            # damping whose changes of velocity are too small to be kept.
+            gained -= wp.dot(velocity, (velocity - motion.velocity) - step.damping)
+            motion.velocity = velocity
             particles.motion[p] = motion
         if ambient_pressure != ZERO:
             work = wp.float64(ambient_pressure * dt * step.work_divergence) * wp.float64(mass / matter.density)
             wp.atomic_add(tallies, slab * TALLIES + AMBIENT_WORK, work)
-        energy = matter.energy + step.energy
+        energy = matter.energy + gained
         if energy < ZERO:
             wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
             energy = ZERO
