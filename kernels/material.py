@@ -3,9 +3,10 @@
 Composed from shape x order of the step x equation of state x burn law x unreacted state. What has burnt has the
 pressure of the products, p(rho, e), the rest that of the unreacted state, p(rho, e - E0), or none without such a state:
 
-    p = F p_products(rho, e) + (1 - F) max(p_unreacted(rho, e - E0), 0).
+    p = F max(p_products(rho, e), 0) + (1 - F) max(p_unreacted(rho, e - E0), 0).
 
-E0 is the energy before the burn, which is chemical. Unburnt explosive carries no tension.
+E0 is the energy before the burn, which is chemical. No matter carries tension: a liquid that is pulled cavitates, grows
+at no pressure, and resists again once it is as dense as before. (In tension particles clump, see docs/numerics.md.)
 """
 
 import functools
@@ -17,7 +18,7 @@ from warp_mpm.kernels.content import FILLING, PRESSURE, inside
 from warp_mpm.kernels.motion import Faces, place, report_fault, settle
 from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Clock, Grid, Maxima, Particles, raise_maxima
-from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, gas_share, relax_density
+from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, gas_share, relax_density, yielding
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
 from warp_mpm.kernels.transfer import look_ahead_function
@@ -92,7 +93,7 @@ def response_function(eos: Any, burn: Any, unreacted: Any = None) -> wp.Function
             burnt = burn_fraction(burn_parameters, burnt_before, since_arrival, since_booster, density)
         products = pressure_offset(eos_parameters, density) + pressure_slope(eos_parameters, density) * energy
         result.burn_fraction = burnt
-        result.pressure = burnt * products
+        result.pressure = wp.where(products < ZERO, ZERO, burnt * products)  # not wp.max, which may drop a NaN
         squared = sound_speed_squared(eos_parameters, density, energy)
         pushes_back = burnt > ZERO
         if wp.static(resists):
@@ -288,7 +289,8 @@ def update_kernel(
                 crossing = onset * inside(filling) * dt * wp.sqrt(squared) * viscosity.inverse_length
                 if wp.static(not passive):
                     crossing *= gas_share(matter.pressure - ambient_pressure, modulus)
-                density = relax_density(density, filling, excess, crossing, equalisation)
+                room = yielding(matter.pressure, step.around[PRESSURE], filling)
+                density = relax_density(density, filling, excess, room, crossing, equalisation)
 
         moved = ZERO
         if wp.static(move):

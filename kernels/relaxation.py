@@ -18,6 +18,7 @@ THIRD = wp.constant(scalar(1.0 / 3.0))
 FIFTH = wp.constant(scalar(0.2))
 TWELFTH = wp.constant(scalar(1.0 / 12.0))
 PASSIVE_EQUALISATION = wp.constant(scalar(0.25))  # towards the pressure around, likewise, where the volume is passive
+TINY = wp.constant(scalar(1.0e-30))  # no pressure [Pa]
 ACTIVE_EQUALISATION = wp.constant(scalar(0.05))  # and where it is not
 
 
@@ -50,13 +51,27 @@ def gas_share(pressure: scalar, modulus: scalar) -> scalar:
 
 
 @wp.func
-def relax_density(density: scalar, filling: scalar, excess: scalar, crossing: scalar, equalisation: scalar) -> scalar:
+def yielding(pressure: scalar, around: scalar, filling: scalar) -> scalar:
+    """Share of the relaxation to the room that a particle takes part in: 1, down to 0 where it would run away.
+
+    Where cells are too full, matter under a pressure that is high already does not shrink, that around it does; where
+    they are not full, matter under next to none does not grow. From a ratio of 2 on the share falls, to 0 at 4.
+    """
+    high = wp.where(filling > ONE, pressure, around)
+    low = wp.where(filling > ONE, around, pressure)
+    return wp.clamp(TWO - HALF * high / wp.max(low, TINY), ZERO, ONE)
+
+
+@wp.func
+def relax_density(
+    density: scalar, filling: scalar, excess: scalar, room: scalar, crossing: scalar, equalisation: scalar
+) -> scalar:
     """Relax a volume to the room that there is, and to the pressure around it.
 
     rho J^(a / (1 + a)) exp(-x b / (1 + b)) with J the filling, x = (p - P) / (rho c^2) the excess over the pressure of
-    the cells around, clamped to 1/2, and a, b = RELAXATION, `equalisation` times dt c / h, the `crossing`.
+    the cells around, clamped to 1/2, and a, b = `room` RELAXATION, `equalisation` times dt c / h, the `crossing`.
     """
-    filling_rate = RELAXATION * crossing
+    filling_rate = RELAXATION * room * crossing
     pressure_rate = equalisation * crossing
     exponent = logarithm(wp.max(filling, HALF)) * filling_rate * (ONE + pressure_rate)
     exponent -= wp.clamp(excess, -HALF, HALF) * pressure_rate * (ONE + filling_rate)

@@ -40,7 +40,7 @@ def sound_speed_squared(gas: StiffenedGasRecord, density: scalar, energy: scalar
 
 @dataclass(frozen=True)
 class StiffenedGas:
-    """A stiffened gas. It carries tension down to -p_inf: it does not cavitate.
+    """A stiffened gas. By itself it carries tension down to -p_inf; the solver lets matter in tension cavitate.
 
     Raises:
         ValueError: gamma is not a finite number above 1, or p_inf not a finite one of at least 0.
