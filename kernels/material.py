@@ -289,7 +289,9 @@ def update_kernel(
                 crossing = onset * inside(filling) * dt * wp.sqrt(squared) * viscosity.inverse_length
                 if wp.static(not passive):
                     crossing *= gas_share(matter.pressure - ambient_pressure, modulus)
-                room = yielding(matter.pressure, step.around[PRESSURE], filling)
+                room = ONE
+                if wp.static(not passive):
+                    room = yielding(matter.pressure, step.around[PRESSURE], filling)
                 density = relax_density(density, filling, excess, room, crossing, equalisation)
 
         moved = ZERO
