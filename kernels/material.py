@@ -124,13 +124,33 @@ def response_function(eos: Any, burn: Any, unreacted: Any = None) -> wp.Function
 
 
 @wp.func
-def rates(response: Response, viscosity: Viscosity, velocity: vector3, divergence: scalar, moved: scalar) -> Maxima:
+def crushing_speed(pressure: scalar, ambient_pressure: scalar, density: scalar) -> scalar:
+    """Speed at which the ambient pressure drives a surface into matter of lower pressure, sqrt((p_a - p) / rho) [m/s].
+
+    A cell at rest moves by cfl^2 h in a step of cfl h over this. Where p_a is 0, or not much above p, sound is faster.
+    """
+    if ambient_pressure == ZERO:
+        return ZERO
+    return wp.sqrt(wp.max(ambient_pressure - pressure, ZERO) / density)
+
+
+@wp.func
+def rates(
+    response: Response,
+    viscosity: Viscosity,
+    ambient_pressure: scalar,
+    density: scalar,
+    velocity: vector3,
+    divergence: scalar,
+    moved: scalar,
+) -> Maxima:
     """What limits the next time step, and health figures."""
     sound_speed = response.sound_speed
+    signal = wp.max(sound_speed, crushing_speed(response.pressure, ambient_pressure, density))
     return Maxima(
-        sound_speed + wp.abs(velocity[0]),
-        sound_speed + wp.abs(velocity[1]),
-        sound_speed + wp.abs(velocity[2]),
+        signal + wp.abs(velocity[0]),
+        signal + wp.abs(velocity[1]),
+        signal + wp.abs(velocity[2]),
         viscous_rate(viscosity, sound_speed, response.closing_rate),
         wp.abs(divergence),
         moved,
@@ -163,6 +183,7 @@ def initial_kernel(eos: Any, burn: Any, unreacted: Any = None) -> wp.Kernel:
         unreacted_parameters: unreacted_record,
         chemical_energy: scalar,
         viscosity: Viscosity,
+        ambient_pressure: scalar,
         maxima: wp.array(dtype=Maxima),
         slab: int,
         begin: int,
@@ -192,7 +213,9 @@ def initial_kernel(eos: Any, burn: Any, unreacted: Any = None) -> wp.Kernel:
         )
         particles.matter[p].pressure = response.pressure
         particles.matter[p].sound_speed = response.elastic_speed
-        raise_maxima(maxima, slab, rates(response, viscosity, particles.motion[p].velocity, ZERO, ZERO))
+        velocity = particles.motion[p].velocity
+        limits = rates(response, viscosity, ambient_pressure, density, velocity, ZERO, ZERO)
+        raise_maxima(maxima, slab, limits)
         if wp.static(burns):
             particles.matter[p].burn_fraction = response.burn_fraction
             raise_burn_speed(maxima, slab, response.burn_fraction, burn_parameters.detonation_speed)
@@ -334,7 +357,9 @@ def update_kernel(
         matter.burn_fraction = response.burn_fraction
         matter.sound_speed = response.elastic_speed
         particles.matter[p] = matter
-        raise_maxima(maxima, slab, rates(response, viscosity, motion.velocity, step.divergence, moved))
+        velocity = motion.velocity
+        limits = rates(response, viscosity, ambient_pressure, density, velocity, step.divergence, moved)
+        raise_maxima(maxima, slab, limits)
         if wp.static(burns):
             raise_burn_speed(maxima, slab, response.burn_fraction, burn_parameters.detonation_speed)
 

@@ -55,8 +55,9 @@ def start_step(
 ):
     """Choose the time step, advance the time to its end, set the damping, and empty the maxima.
 
-    dt = cfl / max over axes of max(c + |v_axis|, D) / h_axis; cfl l^2 / nu for the viscosity; |div v| dt <= 0.2;
-    at most 1.1 times the last; clipped to the end time. The damping k is 0 without it, as walls act on what it moves.
+    dt = cfl / max over axes of max(c + |v_axis|, D) / h_axis, with the crushing speed where it is above c; cfl l^2 / nu
+    for the viscosity; |div v| dt <= 0.2; at most 1.1 times the last; clipped to the end time. The damping k is 0
+    without it, as walls act on what it moves.
     """
     now = clock[0]
     rate = largest(maxima, slabs, VISCOUS_RATE)

@@ -4,7 +4,18 @@ import itertools
 
 import numpy as np
 import pytest
-from scenes_for_tests import CELL, ROUND_OFF, advance, block, explosive, particle_values, start
+from scenes_for_tests import (
+    CELL,
+    OPEN,
+    ROUND_OFF,
+    advance,
+    audited,
+    block,
+    explosive,
+    inert_gas,
+    particle_values,
+    start,
+)
 
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.config import Save, SolverConfig
@@ -89,3 +100,34 @@ def test_time_adds_up_in_double(device):
     assert np.all(np.diff(time) > 0.0)
     np.testing.assert_allclose(np.diff(time)[:-1], dt[1:-1], rtol=1e-9)
     assert time[-1] == 60e-6
+
+
+@pytest.mark.parametrize("energy", [1e6, 2.5e5, 2.5e3, 2.5e-1])
+def test_an_ambient_pressure_limits_the_first_step(energy, device):
+    """cfl h / c, or cfl h / sqrt((p_ambient - p) / rho) in gas so thin that this drives it faster than sound.
+
+    The step is then cfl^2 of the time in which the surface, with (p_ambient - p) / (rho h), would cross its cell twice
+    over; no particle moves by more than a few such shares of its cell, where it would have crossed many.
+    """
+    ambient, density, gamma = 1e5, 1.0, 1.4
+    gas = inert_gas(density, energy, gamma)
+    scene = block((4, 3, 3), material=gas, walls=OPEN, margin_cells=2, ambient_pressure=ambient)
+    solver = advance(start(scene, device), 1)
+    pressure = (gamma - 1.0) * density * energy
+    squared = max(gamma * pressure, ambient - pressure) / density
+    first = float(solver.state.clock_values()["dt"])
+    assert first == pytest.approx(0.3 * CELL / np.sqrt(squared), rel=1e-5)
+    assert float(solver.state.clock_values()["last_drift"]) < 4 * 0.3**2
+
+
+def test_gas_far_below_the_ambient_pressure_implodes_quietly(device):
+    """A block at a hundredth of the ambient pressure is driven together, and bounces; mass and energy are kept.
+
+    Energy relative to what it had: the ambient pressure does a hundred times as much work.
+    """
+    scene = block((6, 3, 3), material=inert_gas(1.0, 2.5e3), walls=OPEN, margin_cells=3, ambient_pressure=1e5)
+    solver = start(scene, device)
+    audit = audited(solver, 150)
+    assert audit.mass_error < 1e-6
+    assert audit.energy_error < 1e-4
+    assert particle_values(solver.state)["density"].max() > 2.0

@@ -131,7 +131,7 @@ class Solver:
                 count,
                 inputs=[
                     *(state.particles, *charge.records),
-                    *(model.viscosity, state.maxima, slab, begin),
+                    *(model.viscosity, model.ambient_pressure, state.maxima, slab, begin),
                 ],
                 device=model.device,
             )
