@@ -16,6 +16,7 @@ from warp_mpm.geometry import Solid
 from warp_mpm.ignition import resolve_detonators
 from warp_mpm.lattice import Lattice
 from warp_mpm.materials import Material
+from warp_mpm.resistance import check_resistance
 from warp_mpm.scene import Domain, Gauge, Scene, SectionPlane, Segment, Vector, Walls
 
 OUTSIDE_TOLERANCE = 1e-9  # of the domain's size
@@ -289,6 +290,7 @@ class SceneBuilder:
         reach = max(domain.spacing) / 2
         detonators = resolve_detonators(self._here, self._detonators, self._bodies, reach)
         charges = cut_charges(self._here, self._bodies, domain)
+        check_resistance(self._here, charges, detonators, 2.0 * reach, end_time)
         pictures = self._picture_times
         if pictures is None:
             pictures = tuple(end_time * part / PICTURES for part in range(1, PICTURES + 1))
@@ -310,9 +312,11 @@ class SceneBuilder:
             picture_times=pictures,
             gauges=carried_gauges(self._here, self._gauges, domain, charges),
             warnings=tuple(
-                warning
-                for body, charge in zip(self._bodies, charges, strict=True)
-                for warning in charge_warnings(charge, Lattice(domain, body.particles_per_axis).site_volume)
+                dict.fromkeys(  # what charges of one material have in common is said once
+                    warning
+                    for body, charge in zip(self._bodies, charges, strict=True)
+                    for warning in charge_warnings(charge, Lattice(domain, body.particles_per_axis).site_volume)
+                )
             ),
         )
 

@@ -19,7 +19,9 @@ from warp_mpm.output.whole_file import whole_file, write_error
 from warp_mpm.scene import Gauge
 
 GIGAPASCAL = 1e9  # [Pa]
+MEGAPASCAL = 1e6  # [Pa]
 KILOPASCAL = 1e3  # [Pa]
+SMALL = 0.1 * GIGAPASCAL  # lower pressures are shown in MPa [Pa]
 MICROSECOND = 1e-6  # [s]
 DASH = "–"
 
@@ -214,7 +216,9 @@ def _cost(summary: Mapping[str, Any]) -> str:
 
 
 def _pressure(value: float | None) -> str:
-    return DASH if value is None else f"{value / GIGAPASCAL:.3f} GPa"
+    if value is None:
+        return DASH
+    return f"{value / GIGAPASCAL:.3f} GPa" if not 0.0 < value < SMALL else f"{value / MEGAPASCAL:.2f} MPa"
 
 
 def _time(value: float | None) -> str:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.colors import LogNorm, Normalize
 
 from warp_mpm.checks import mistake
 from warp_mpm.output.description import SceneDescription
@@ -15,6 +16,8 @@ from warp_mpm.run_directory import SUMMARY, Run
 COLOR_LIMIT = 1.6  # of p_CJ: brief focusing in a corner would otherwise leave the fronts dark; as in the USD file
 FAINT = 0.02  # share of the range of colours below which gas is not worth showing
 BRIGHTEST_SHARE = 0.003  # of an instant's values that may lie above the last colour
+WIDE = 200.0  # the last colour over the highest pressure of an instant, from which on colours are logarithmic
+BELOW = 30.0  # that pressure over the first colour then
 
 
 def setup_of(run: Run) -> SceneDescription:
@@ -91,8 +94,25 @@ def pressure_range(run: Run) -> tuple[float, float]:
     return range_of(shown, cj_pressure(run))
 
 
+def pressure_scale(run: Run) -> Normalize:
+    """The scale of colours for pressures in GPa: from zero, or logarithmic where that would leave an instant dark.
+
+    A shock in air has a thousandth of the pressure of the charge that it came from.
+    """
+    lower, upper = pressure_range(run)
+    shown = section_pictures(run) if run.pictures or run.file is not None else ()
+    highest = [float(np.quantile(picture.pressure, 1.0 - BRIGHTEST_SHARE)) for picture in shown]
+    weakest = min((value for value in highest if value > 0.0), default=upper)
+    if weakest * WIDE >= upper:
+        return Normalize(lower / GIGAPASCAL, upper / GIGAPASCAL)
+    return LogNorm(weakest / BELOW / GIGAPASCAL, upper / GIGAPASCAL, clip=True)
+
+
 def faint_pressure(run: Run) -> float:
     """The pressure below which gas is not worth showing [Pa]."""
+    scale = pressure_scale(run)
+    if isinstance(scale, LogNorm):
+        return (scale.vmin or 0.0) * GIGAPASCAL
     lower, upper = pressure_range(run)
     return lower + FAINT * (upper - lower)
 

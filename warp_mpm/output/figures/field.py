@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from warp_mpm.output import colormap
@@ -16,7 +15,7 @@ from warp_mpm.output.figures.content import (
     cj_pressure,
     faint_pressure,
     picture_frames,
-    pressure_range,
+    pressure_scale,
     setup_of,
 )
 from warp_mpm.output.figures.plane import is_thin, page
@@ -88,8 +87,7 @@ class SpacePanels:
         self._open = Wall.OPEN in self._setup.walls.faces()
         self._faint = faint_pressure(run)
         self._bodies: dict[int, Cells] = {}  # of the given frames
-        lower, upper = pressure_range(run)
-        self._scale = Normalize(lower / GIGAPASCAL, upper / GIGAPASCAL)
+        self._scale = pressure_scale(run)
         self.view = view_of(self._setup.section, self._thick)
         points = [corners_of(*self._box)]
         for frame in frames:

@@ -18,7 +18,7 @@ from warp_mpm.output.figures.content import (
     faint_pressure,
     frames_of,
     picture_frames,
-    pressure_range,
+    pressure_scale,
     setup_of,
 )
 from warp_mpm.output.figures.field import SpacePanels
@@ -105,11 +105,10 @@ def _palette() -> Image.Image:
 
 def _section_film(run: Run, _: bool) -> tuple[Figure, Show]:
     setup = setup_of(run)
-    lower, upper = pressure_range(run)
     window = window_of(run, np.max([frame.section for frame in run.frames], axis=0) > faint_pressure(run))
     figure = _figure_for(window)
     axes = figure.subplots()
-    scale = {"cmap": colormap.NAME, "vmin": lower / GIGAPASCAL, "vmax": upper / GIGAPASCAL}
+    scale = {"cmap": colormap.NAME, "norm": pressure_scale(run)}
     image = draw_nodes(axes, setup, run.frames[0].section / GIGAPASCAL, window, interpolation="bilinear", **scale)
     draw_outlines([axes], run)
     label_axes(np.array([[axes]]), setup)

@@ -2,11 +2,12 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.output import colormap
-from warp_mpm.output.figures.content import cj_pressure, pressure_range, setup_of, step_record
+from warp_mpm.output.figures.content import cj_pressure, pressure_scale, setup_of, step_record
 from warp_mpm.output.figures.style import (
     GIGAPASCAL,
     MARK,
@@ -31,7 +32,7 @@ def front_figure(run: Run) -> Figure:
     record = step_record(run).line
     if record is None:
         raise NothingToDrawError("the scene names neither a line nor a front_path")
-    lower, upper = pressure_range(run)
+    scale = pressure_scale(run)
     distance = record.distance / MILLIMETRE
     figure = new_figure((5.6, 5.6))
     peak, axes = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.6))
@@ -42,8 +43,7 @@ def front_figure(run: Run) -> Figure:
         aspect="auto",
         interpolation="bilinear",
         cmap=colormap.NAME,
-        vmin=lower / GIGAPASCAL,
-        vmax=upper / GIGAPASCAL,
+        norm=scale,
         extent=(distance[0], distance[-1], times[0] / MICROSECOND, times[-1] / MICROSECOND),
     )
     _draw_fronts(axes, run, record)
@@ -52,7 +52,10 @@ def front_figure(run: Run) -> Figure:
     peak.plot(distance, record.pressure.max(axis=0) / GIGAPASCAL, color=SERIES[0])
     peak.set_ylabel("peak [GPa]")
     draw_cj_line(peak, cj_pressure(run))
-    peak.set_ylim(bottom=0.0)
+    if isinstance(scale, LogNorm):
+        peak.set_yscale("log")
+    else:
+        peak.set_ylim(bottom=0.0)
     draw_pressure_bar(figure, image, axes, cj_pressure(run), shrink=1.0)
     return figure
 

@@ -11,6 +11,8 @@ PRESSURE = "_pressure_pa"  # ends the name of a gauge's column
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#1b1b1b", "#56b4e9", "#e69f00")  # Okabe and Ito's
 LINES = ("-", "--", "-.", ":")
 KILOPASCAL_SECOND = 1e3  # [Pa s]
+MEGAPASCAL = 1e6  # [Pa]
+SMALL = 0.1 * GIGAPASCAL  # lower pressures are shown in MPa [Pa]
 
 
 def gauges_figure(run: Run) -> Figure:
@@ -25,16 +27,19 @@ def gauges_figure(run: Run) -> Figure:
     time = run.gauges["time_s"]
     figure = new_figure((6.4, 6.0))
     panels = figure.subplots(3, 1, sharex=True, height_ratios=(1.6, 1.0, 1.0))
+    highest = max(float(run.gauges[name + PRESSURE].max()) for name in names)
+    unit, scale = ("GPa", GIGAPASCAL) if highest >= SMALL else ("MPa", MEGAPASCAL)
     for number, name in enumerate(names):
         pressure = run.gauges[name + PRESSURE]
         impulse = np.append(0.0, np.cumsum(0.5 * (pressure[1:] + pressure[:-1]) * np.diff(time)))
         speed = np.linalg.norm([run.gauges[f"{name}_velocity_{axis}_m_s"] for axis in "xyz"], axis=0)
         color, line = COLORS[number % len(COLORS)], LINES[number // len(COLORS) % len(LINES)]
-        curves = (pressure / GIGAPASCAL, impulse / KILOPASCAL_SECOND, speed)
+        curves = (pressure / scale, impulse / KILOPASCAL_SECOND, speed)
         for axes, curve in zip(panels, curves, strict=True):
             axes.plot(time / MICROSECOND, curve, color=color, linestyle=line, linewidth=1.1, label=name)
-    draw_cj_line(panels[0], cj_pressure(run))
-    for axes, label in zip(panels, ("pressure [GPa]", "impulse [kPa s]", "speed [m/s]"), strict=True):
+    if highest >= SMALL:
+        draw_cj_line(panels[0], cj_pressure(run))
+    for axes, label in zip(panels, (f"pressure [{unit}]", "impulse [kPa s]", "speed [m/s]"), strict=True):
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0)
     panels[-1].set_xlim(time[0] / MICROSECOND, time[-1] / MICROSECOND)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import MaxNLocator
@@ -13,7 +13,14 @@ from matplotlib.ticker import MaxNLocator
 from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.output import colormap
 from warp_mpm.output.description import SceneDescription
-from warp_mpm.output.figures.content import charge_box, cj_pressure, faint_pressure, setup_of, step_record
+from warp_mpm.output.figures.content import (
+    charge_box,
+    cj_pressure,
+    faint_pressure,
+    pressure_scale,
+    setup_of,
+    step_record,
+)
 from warp_mpm.output.figures.plane import (
     draw_detonators,
     draw_nodes,
@@ -54,7 +61,10 @@ def peak_figure(run: Run) -> Figure:
         return _profile(run, ratio, label)
     figure, axes = _map(run, peak > faint_pressure(run))
     upper = max(float(np.quantile(ratio, 1.0 - HIGHEST_SHARE)), 1e-6)
-    image = _draw_values(axes, run, ratio, cmap=colormap.NAME, vmin=0.0, vmax=upper)
+    norm = Normalize(0.0, upper)
+    if isinstance(pressure_scale(run), LogNorm):
+        norm = LogNorm(faint_pressure(run) / (reference or GIGAPASCAL), upper, clip=True)
+    image = _draw_values(axes, run, ratio, cmap=colormap.NAME, norm=norm)
     bar = _draw_bar(figure, axes, image, label, extend="max")
     if reference is not None and ratio.min() < 1.0 < ratio.max():
         _draw_lines(axes, setup_of(run), ratio, [1.0], colors="white", linewidths=0.8)

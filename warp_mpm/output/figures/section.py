@@ -5,7 +5,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from warp_mpm.output import colormap
-from warp_mpm.output.figures.content import cj_pressure, faint_pressure, pressure_range, section_pictures, setup_of
+from warp_mpm.output.figures.content import cj_pressure, faint_pressure, pressure_scale, section_pictures, setup_of
 from warp_mpm.output.figures.plane import (
     draw_detonators,
     draw_nodes,
@@ -42,12 +42,11 @@ def section_figure(run: Run) -> Figure:
 
 def _panels(run: Run) -> Figure:
     setup, pictures = setup_of(run), section_pictures(run)
-    lower, upper = pressure_range(run)
     window = window_of(run, np.max([picture.pressure for picture in pictures], axis=0) > faint_pressure(run))
     rows, columns, size = page(window, len(pictures))
     figure = new_figure(size)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    scale = {"cmap": colormap.NAME, "vmin": lower / GIGAPASCAL, "vmax": upper / GIGAPASCAL}
+    scale = {"cmap": colormap.NAME, "norm": pressure_scale(run)}
     for number, (axes, picture) in enumerate(zip(panels.flat, pictures, strict=False)):
         values = picture.pressure / GIGAPASCAL
         image = draw_nodes(axes, setup, values, window, interpolation="bilinear", **scale)
