@@ -22,7 +22,7 @@ def scene(
     *,
     cell_size: float = 6.25e-3,
     particles_per_axis: int = 2,
-    charge_particles_per_axis: int = 6,
+    charge_particles_per_axis: int = 4,
     end_time: float = 120e-6,
 ) -> Scene:
     """An octant of a ball of TNT, lit in its center, in air at standard pressure; slip walls on the planes of symmetry.

@@ -12,6 +12,7 @@ from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, OUTFLOW_LANES
 from warp_mpm.kernels.walls import REACTIONS
 from warp_mpm.scene import FACE_NAMES
 from warp_mpm.solver import Solver
+from warp_mpm.state import State
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,21 @@ def totals_of(solver: Solver) -> Totals:
     )
 
 
-def history_row(totals: Totals, step: int, dt: float, peak_pressure: float, spread: float) -> dict[str, float]:
+def sparse_share(state: State) -> float:
+    """Share of the explosives' particles in the domain that are larger than a cell; 0 without any.
+
+    Where gas has become so thin, particles lie farther apart than nodes: cells between them are empty.
+    """
+    charges, domain = state.model.scene.charges, state.model.scene.domain
+    burns = np.repeat([charge.material.burn is not None for charge in charges], [len(c.positions) for c in charges])
+    mass, density = state.field("mass"), state.field("density")
+    inside = burns & (mass > 0.0)
+    return float(np.mean(mass[inside] > density[inside] * domain.cell_volume)) if inside.any() else 0.0
+
+
+def history_row(
+    totals: Totals, step: int, dt: float, peak_pressure: float, spread: float, sparse: float
+) -> dict[str, float]:
     """A row of history.csv."""
     row: dict[str, float] = {
         "time_s": totals.time,
@@ -151,6 +166,7 @@ def history_row(totals: Totals, step: int, dt: float, peak_pressure: float, spre
         "dt_s": dt,
         "peak_pressure_pa": peak_pressure,
         "pressure_spread": spread,
+        "sparse_share": sparse,
         "mass_kg": totals.mass,
         "momentum_x": totals.momentum[0],
         "momentum_y": totals.momentum[1],

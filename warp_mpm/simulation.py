@@ -13,7 +13,7 @@ import numpy as np
 
 from warp_mpm.checkpoint import Checkpoints, part, restore_solver, saved_solver
 from warp_mpm.config import Save, SolverConfig
-from warp_mpm.conservation import Audit, Totals, history_row, totals_of
+from warp_mpm.conservation import Audit, Totals, history_row, sparse_share, totals_of
 from warp_mpm.errors import SimulationError, Terminated
 from warp_mpm.fingerprint import fingerprints
 from warp_mpm.guards import check_memory, check_state, clamp_warnings, writable_directory
@@ -292,7 +292,8 @@ class _Run:
         clock = self.state.clock_values()
         mean = float(pressure.mean()) if len(pressure) else 0.0
         spread = float(pressure.std()) / mean if mean > 0.0 else 0.0
-        return history_row(totals, self.steps, float(clock["dt"]), self.recorder.take_peak(), spread)
+        peak, sparse = self.recorder.take_peak(), sparse_share(self.state)
+        return history_row(totals, self.steps, float(clock["dt"]), peak, spread, sparse)
 
     def _files(self) -> AbstractContextManager[Any]:
         """A function that writes a frame and a row of the history, or None; closed whatever way the run ends."""
@@ -361,6 +362,7 @@ class _Run:
                 if name.startswith("mass_out_")
             },
             "pressure_spread": final["pressure_spread"],
+            "sparse_share": final["sparse_share"],
             "particle_volume_error": self._volume_error(),
             "warnings": [*self.scene.warnings, *self.warnings, *self._frame_warnings(), *clamp_warnings(self.audit)],
         }

@@ -11,6 +11,7 @@ from warp_mpm.output.frame import LineRecord, StepRecord
 from warp_mpm.scene import Scene
 
 ARRIVAL_SHARE = 0.05  # of p_CJ: the front has arrived at a point when the field pressure there reaches it
+NOTABLE_RISE = 2.0  # over a gauge's first pressure: less is no front
 FITTED_PART = (0.1, 1.0)  # of the front path: what the burning start of the wave does is left out
 MEETING_PART = (0.25, 0.85)  # of the way from a detonator to a collision: start and collision zone are left out
 PLATEAU_PART = (0.5, 0.9)  # of the travel time: when the front pressure is taken
@@ -172,17 +173,17 @@ def gauge_pressure(scene: Scene, record: StepRecord, material: Material) -> floa
     return float(np.median(record.path.pressure[before][:, used].max(axis=0)))
 
 
-def gauge_figures(record: StepRecord, material: Material | None) -> dict[str, dict[str, float | None]]:
+def gauge_figures(scene: Scene, record: StepRecord, material: Material | None) -> dict[str, dict[str, float | None]]:
     """By gauge: when the front arrived, the highest pressure and its time, and the impulse, the integral of p dt.
 
-    The front has arrived when the pressure reaches 0.05 p_CJ, as along the front path; None if it never did, or without
-    an explosive.
+    The front has arrived when the pressure reaches 0.05 p_CJ, as along the front path, or in what does not burn half of
+    its rise; None if it never did, or without an explosive.
     """
-    state = material.cj if material is not None else None
     figures: dict[str, dict[str, float | None]] = {}
     for name, gauge in record.gauges.items():
         line = LineRecord(gauge.time, np.zeros(1), gauge.pressure[:, None])
-        arrival = float(arrival_times(line, ARRIVAL_SHARE * state.pressure)[0]) if state else np.nan
+        threshold = _gauge_threshold(scene, name, gauge.pressure, material)
+        arrival = np.nan if threshold is None else float(arrival_times(line, threshold)[0])
         highest = int(np.argmax(gauge.pressure))
         mean = 0.5 * (gauge.pressure[1:].astype(np.float64) + gauge.pressure[:-1])
         figures[name] = {
@@ -192,6 +193,18 @@ def gauge_figures(record: StepRecord, material: Material | None) -> dict[str, di
             "impulse_pa_s": float(mean @ np.diff(gauge.time)),
         }
     return figures
+
+
+def _gauge_threshold(scene: Scene, name: str, pressure: np.ndarray, material: Material | None) -> float | None:
+    """Pressure at which the front has arrived at a gauge that saw pressures (steps,) [Pa]; None if none can have."""
+    if material is None or material.cj is None:
+        return None
+    place = np.array([gauge.position for gauge in scene.gauges if gauge.name == name])
+    inert = [charge for charge in scene.charges if charge.material.burn is None]
+    if not any(charge.solid.contains(place)[0] for charge in inert):
+        return ARRIVAL_SHARE * material.cj.pressure
+    first, highest = float(pressure[0]), float(pressure.max())
+    return 0.5 * (first + highest) if highest > NOTABLE_RISE * first else None
 
 
 def theory(scene: Scene) -> dict[str, float | None]:
@@ -221,5 +234,5 @@ def figures_of_merit(scene: Scene, record: StepRecord) -> dict[str, object]:
         "collision_positions_m": meeting_points(scene, record, material) if material is not None else [],
         "peak_pressure_pa": float(record.field_pressure.max()),
         "max_particle_pressure_pa": float(record.particle_pressure.max()),
-        "gauges": gauge_figures(record, material),
+        "gauges": gauge_figures(scene, record, material),
     }
