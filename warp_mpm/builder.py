@@ -277,7 +277,8 @@ class SceneBuilder:
         """Check how everything fits together, cut the charges into particles, and return the scene.
 
         Raises:
-            InputError: something is missing, does not fit, or needs more memory than there is.
+            InputError: something is missing, does not fit, or needs more memory than there is; or explosive that has
+                no pressure before it burns may be reached by something else before its own wave (`resistance.py`).
         """
         domain = self._given("domain", self._domain)
         end_time = self._given("end_time", self._end_time)

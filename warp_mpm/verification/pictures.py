@@ -60,9 +60,9 @@ def draw_problem(path: str | Path, report: ProblemReport) -> None:
 
 
 def _draw_panel(axes: Axes, panel: Panel, report: ProblemReport) -> None:
-    """The exact curves below, the computed ones on top."""
+    """The exact (or measured) curves below, the computed ones on top."""
     for number, curve in enumerate(_exact_curves(panel, report)):
-        label = "exact" if number == 0 else None
+        label = report.problem.answer if number == 0 else None
         _plot(axes, panel, curve, color=EXACT_COLOR, linewidth=2.6, alpha=0.45, label=label)
     for result, style in zip(report.results, _styles(report.results), strict=True):
         computed = result.measurement.curves.get(panel.name)

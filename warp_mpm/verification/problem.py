@@ -147,6 +147,7 @@ class Problem(ABC):
     levels: tuple[Level, ...] = ()  # solved by default, coarsest first within a variant; none: only with --full
     more_levels: tuple[Level, ...] = ()  # solved besides with --full
     panels: tuple[Panel, ...] = ()  # of the picture
+    answer: str = "exact"  # what the picture calls the curves of `exact_curves`
     bounds: tuple[Bound, ...] = ()  # besides those on energy, mass and momentum
     moves: bool = True  # False: a single step shows all there is; conservation is not judged
 
