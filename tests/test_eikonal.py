@@ -4,6 +4,8 @@ Times are judged in cells of travel, dt D / h. Kenamond's problems, and the spee
 `test_kenamond.py`.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes_for_tests import ROUND_OFF, explosive, inert_gas, start
@@ -14,6 +16,7 @@ from warp_mpm.errors import InputError
 from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.geometry import Box, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.kernels.eos.mie_gruneisen import MieGruneisen
 from warp_mpm.kernels.precision import NEVER
 from warp_mpm.materials import explosive as make_explosive
 
@@ -159,6 +162,8 @@ def test_a_gap_stops_the_wave_and_touching_explosives_pass_it_on(device):
         np.testing.assert_allclose(times, exact, rtol=0, atol=EXACT * times.max())
     with pytest.raises(InputError, match=r"charge 'right': expected a detonator that lights this explosive, got none"):
         arrival(cells, bodies, [lamp], device)
+    resisting = replace(explosive(), unreacted=MieGruneisen(1000.0, 2000.0))  # as what is not lit must be
+    bodies["right"] = (right, resisting)
     found = arrival(cells, bodies, [lamp], device, may_stay_unlit=True)
     assert found["right"][1].min() == pytest.approx(float(NEVER))
     parts = {"all": (left | right, explosive())}
