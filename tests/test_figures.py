@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from runs_for_tests import GAUGES, GPA, first_frame, left_by, run_of
@@ -16,7 +17,7 @@ from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.output.description import scene_values
 from warp_mpm.output.figures import PICTURES, draw_figures
 from warp_mpm.output.figures.charge import charge_figure
-from warp_mpm.output.figures.content import pressure_range
+from warp_mpm.output.figures.content import faint_pressure, pressure_range
 from warp_mpm.output.figures.energy import energy_figure
 from warp_mpm.output.figures.field import field_figure
 from warp_mpm.output.figures.front import front_figure
@@ -258,6 +259,26 @@ def test_the_field_is_the_surface_at_the_frames_nearest_to_the_instants(plate):
     difference = np.abs(np.array(faces.get_array())[:, None] - means).min(axis=1)
     assert difference.max() < 1e-6 * max(means)
     assert {axes.collections[0].get_clim() for axes in panels} == {tuple(p / GPA for p in pressure_range(plate))}
+
+
+def test_colors_are_logarithmic_where_an_instant_would_be_dark(scene, tmp_path):
+    """From zero while the weakest of the instants has 1/200 of the strongest, else from 1/30 of the weakest."""
+    nodes = [scene.domain.cells[axis] + 1 for axis in scene.section.in_plane]
+
+    def scale_of(weakest):
+        pictures = [SectionPicture(time, np.full(nodes, value)) for time, value in ((1e-6, GPA), (2e-6, weakest))]
+        run = left_by(tmp_path, scene, pictures=pictures)
+        image = panels_of(section_figure(run))[0].images[0]
+        assert image.norm.vmax == pytest.approx(pressure_range(run)[1] / GPA) == 1.0
+        return image.norm, faint_pressure(run)
+
+    even, faint = scale_of(GPA / 199.0)
+    assert not isinstance(even, LogNorm)
+    assert (even.vmin, faint) == (0.0, 0.02 * GPA)
+    wide, faint = scale_of(GPA / 1000.0)
+    assert isinstance(wide, LogNorm)
+    assert wide.vmin == pytest.approx(1e-3 / 30.0)
+    assert faint == pytest.approx(1e-3 / 30.0 * GPA)
 
 
 def test_peak_map_is_in_multiples_of_cj(plate):

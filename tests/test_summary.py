@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from scenes_for_tests import explosive
+from scenes_for_tests import explosive, inert_gas
 
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.detonators import PlaneDetonator, PointDetonator
 from warp_mpm.geometry import Box
-from warp_mpm.output.frame import LineRecord, SectionRecord, StepRecord
+from warp_mpm.output.frame import GaugeRecord, LineRecord, SectionRecord, StepRecord
 from warp_mpm.scene import Segment
 from warp_mpm.summary import arrival_times, figures_of_merit, ideal_arrival, lit_explosive
 
@@ -126,3 +126,24 @@ def test_what_does_not_apply_is_none():
     assert lit_explosive(scene) is scene.charges[0].material
     nothing_yet = front_record(bar(), SPEED, 2 * LENGTH, 2e9)
     assert figures_of_merit(bar(), nothing_yet)["front_speed_m_s"] is None
+
+
+def test_a_front_arrives_in_air_with_half_of_its_rise():
+    """0.05 p_CJ in the explosive; beside it half-way from the gauge's first pressure to its highest; or never."""
+    builder = SceneBuilder("pair")
+    builder.domain((0.0, 0.0, 0.0), (0.2, 0.1, 0.1), cell_size=0.02)
+    builder.charge(Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)), explosive(), name="charge")
+    builder.charge(Box((0.1, 0.0, 0.0), (0.2, 0.1, 0.1)), inert_gas(), name="gas")
+    builder.detonator(PointDetonator((0.0, 0.0, 0.0)))
+    builder.end_time(1e-5)
+    for name, x in (("inside", 0.05), ("beside", 0.15), ("quiet", 0.16)):
+        builder.gauge((x, 0.05, 0.05), name=name)
+    time, ones = np.arange(3.0), np.ones(3)
+    threshold = 0.05 * explosive().cj.pressure
+    seen = {"inside": [0.0, 2.0 * threshold, threshold], "beside": [1e5, 1e5, 9e5], "quiet": [1e5, 1.9e5, 1e5]}
+    still, nowhere = np.zeros((3, 3)), np.zeros((3, 0))
+    gauges = {name: GaugeRecord(time, np.array(p), still, ones, None) for name, p in seen.items()}
+    record = StepRecord(time, ones, ones, ones, None, nowhere, None, None, NO_SECTION, gauges)
+    figures = figures_of_merit(builder.build(), record)["gauges"]
+    arrivals = [figures[name]["arrival_time_s"] for name in seen]
+    assert arrivals == [pytest.approx(0.5), pytest.approx(1.5), None]

@@ -143,6 +143,13 @@ def test_the_table_sets_the_run_beside_theory():
     assert "warning" not in text
 
 
+def test_small_pressures_are_in_megapascal():
+    gauge = {"arrival_time_s": 1e-6, "peak_pressure_pa": 12.34e6, "peak_time_s": 2e-6, "impulse_pa_s": 1e3}
+    text = printed(SUMMARY | {"gauges": {"far": gauge, "near": gauge | {"peak_pressure_pa": 0.1e9}}})
+    assert line_with(text, "far")[2:4] == ["12.34", "MPa"]
+    assert line_with(text, "near")[2:4] == ["0.100", "GPa"]
+
+
 @pytest.mark.parametrize("missing", [None, "absent"])
 def test_what_does_not_apply_is_a_dash(missing):
     summary = {key: None for key in SUMMARY} if missing is None else {}

@@ -94,8 +94,7 @@ def explosive(
     the Chapman-Jouguet condition gives; `cj_pressure` [Pa] is compared if stated. A wave that runs faster than the
     energy allows has a low front, and one that runs 0.5 % slower grows without bound, so they must match.
     `burn` says when it burns. `unreacted` is the equation of state of what has not burnt, such as `MieGruneisen`, with
-    energies from E0; without it unburnt explosive has no pressure, and scenes in which something reaches it before its
-    own wave are refused (`resistance.py`). `citation` says where the numbers are from.
+    energies from E0; without it that has no pressure, and nothing may reach it first (`resistance.py`).
 
     Raises:
         InputError: a value is not positive and finite, or speed or pressure do not match the equation of state.
