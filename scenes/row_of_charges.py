@@ -12,7 +12,7 @@ from warp_mpm.scene import Scene, Wall, Walls
 RADIUS = 0.015  # of a charge [m]
 SPACING = 0.12  # from axis to axis [m]
 ROOM = 0.1  # of water beside the outer ones, and across [m]
-PICTURES = 6
+SHOWN = (6e-6, 25e-6)  # after each detonator: instants worth a picture [s]
 
 # Hugoniot of pressed TNT: N. L. Coleburn, T. P. Liddiard, J. Chem. Phys. 44 (1966) 1929.
 UNREACTED = MieGruneisen(density=1630.0, sound_speed=2390.0, slope=2.05, gruneisen=0.9)
@@ -56,5 +56,6 @@ def scene(
     builder.gauge((SPACING / 4, 0.0, edge / 2), name="near")
     builder.gauge((SPACING / 2, 0.0, edge / 2), name="middle")
     builder.end_time(end_time)
-    builder.picture_times(end_time * part / PICTURES for part in range(1, PICTURES + 1))
+    instants = [number * delay + shown for number in range(charges) for shown in SHOWN]
+    builder.picture_times(sorted(time for time in instants if time <= end_time))
     return builder.build()

@@ -12,6 +12,7 @@ COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#1b1b1b", "#56b4e9", "#e6
 LINES = ("-", "--", "-.", ":")
 KILOPASCAL_SECOND = 1e3  # [Pa s]
 MEGAPASCAL = 1e6  # [Pa]
+CLOSE = 0.25  # share of p_CJ that the gauges must have seen for it to be shown
 SMALL = 0.1 * GIGAPASCAL  # lower pressures are shown in MPa [Pa]
 
 
@@ -37,8 +38,9 @@ def gauges_figure(run: Run) -> Figure:
         curves = (pressure / scale, impulse / KILOPASCAL_SECOND, speed)
         for axes, curve in zip(panels, curves, strict=True):
             axes.plot(time / MICROSECOND, curve, color=color, linestyle=line, linewidth=1.1, label=name)
-    if highest >= SMALL:
-        draw_cj_line(panels[0], cj_pressure(run))
+    cj = cj_pressure(run)
+    if cj is not None and highest >= CLOSE * cj:  # else the line would leave no room for the curves
+        draw_cj_line(panels[0], cj)
     for axes, label in zip(panels, (f"pressure [{unit}]", "impulse [kPa s]", "speed [m/s]"), strict=True):
         axes.set_ylabel(label)
         axes.set_ylim(bottom=0.0)
