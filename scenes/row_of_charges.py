@@ -49,13 +49,13 @@ def scene(
         builder.charge(half - (box - rod), explosive, particles_per_axis=particles_per_axis, name=name)
         lit = number * not_negative("delay", delay)
         builder.detonator(LineDetonator((place, 0.0, 0.0), (place, 0.0, edge), time=lit, charges=(name,)))
-        builder.gauge((place, RADIUS + 2.0 * RADIUS, edge / 2), name=f"beside_{number + 1}")
+        builder.gauge((place, 3.0 * RADIUS, edge / 2), name=f"beside_{number + 1}")
         water = water - rod
     builder.charge(water, find_material("water"), particles_per_axis=particles_per_axis, name="water")
     builder.line((-ROOM, 0.0, edge / 2), (box.upper[0], 0.0, edge / 2))
     builder.gauge((SPACING / 4, 0.0, edge / 2), name="near")
     builder.gauge((SPACING / 2, 0.0, edge / 2), name="middle")
     builder.end_time(end_time)
-    instants = [number * delay + shown for number in range(charges) for shown in SHOWN]
+    instants = {number * delay + shown for number in range(charges) for shown in SHOWN}
     builder.picture_times(sorted(time for time in instants if time <= end_time))
     return builder.build()
