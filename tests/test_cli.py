@@ -109,6 +109,7 @@ MISTAKES = [
     (("run", "two_point", "--isosurface", "nan"), "save: isosurface: expected a positive number, got nan"),
     (("run", "two_point", "--fields", "density", "hue"), "save: fields: expected any of density, burn_fraction"),
     (("run", "two_point", "--threads", "0"), "threads: expected a whole number of at least 1, got 0"),
+    (("run", "row_of_charges", "--set", "cell_size=1e-2", "resists=false"), "expected explosive that resists"),
     (("run", "two_point", "--device", "abacus", "--set", *COARSE), "abacus"),
 ]
 
