@@ -8,7 +8,7 @@ import numpy as np
 
 from warp_mpm import checks
 from warp_mpm.cells import check_aspect, domain_of_cells
-from warp_mpm.charges import Body, charge_warnings, check_fit, cut_charges
+from warp_mpm.charges import Body, charge_warnings, check_fit, cut_charges, fill_what_is_free
 from warp_mpm.checks import mistake
 from warp_mpm.detonators import Detonator, checked
 from warp_mpm.gauges import carried_gauges
@@ -126,7 +126,7 @@ class SceneBuilder:
         may_stay_unlit: bool = False,
         name: str | None = None,
     ) -> None:
-        """Add a body of one material.
+        """Add a body of one material, where no charge added before it is: later ones fill only what is free.
 
         Args:
             solid: its shape.
@@ -286,11 +286,12 @@ class SceneBuilder:
             raise mistake(f"{self._here}: charges", "at least one", "none", "add one with charge()")
         check_fit(self._here, self._bodies, domain, self._cell_size)
         check_aspect(self._here, domain)
-        section = self._section if self._section is not None else _mid_plane([body.solid for body in self._bodies])
+        bodies = fill_what_is_free(self._here, self._bodies)
+        section = self._section if self._section is not None else _mid_plane([body.solid for body in bodies])
         self._check_views(domain, end_time, section)
         reach = max(domain.spacing) / 2
-        detonators = resolve_detonators(self._here, self._detonators, self._bodies, reach)
-        charges = cut_charges(self._here, self._bodies, domain)
+        detonators = resolve_detonators(self._here, self._detonators, bodies, reach)
+        charges = cut_charges(self._here, bodies, domain)
         check_resistance(self._here, charges, detonators, 2.0 * reach, end_time)
         pictures = self._picture_times
         if pictures is None:
@@ -315,7 +316,7 @@ class SceneBuilder:
             warnings=tuple(
                 dict.fromkeys(  # what charges of one material have in common is said once
                     warning
-                    for body, charge in zip(self._bodies, charges, strict=True)
+                    for body, charge in zip(bodies, charges, strict=True)
                     for warning in charge_warnings(charge, Lattice(domain, body.particles_per_axis).site_volume)
                 )
             ),

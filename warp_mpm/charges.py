@@ -2,13 +2,13 @@
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warp_mpm.checks import mistake
-from warp_mpm.geometry import Solid
+from warp_mpm.errors import InputError
+from warp_mpm.geometry import TOUCHING, Solid, certainly_apart
 from warp_mpm.lattice import Lattice
 from warp_mpm.materials import Material
 from warp_mpm.scene import Charge, Domain, Vector
@@ -32,11 +32,34 @@ class Body:
     particles_per_axis: int  # along each axis of every cell
     velocity: Velocity | None = None  # at the start [m/s]; None: at rest
     may_stay_unlit: bool = False  # an explosive to which no detonation needs to come
+    cut_by: tuple[str, ...] = ()  # the earlier bodies that its solid leaves out
 
     @property
     def explosive(self) -> bool:
         """Whether it burns."""
         return self.material.burn is not None
+
+
+def fill_what_is_free(where: str, bodies: Sequence[Body]) -> tuple[Body, ...]:
+    """The bodies, each without what the ones before it take: none overlap any more.
+
+    Bodies that are certainly apart keep their solids as they are, and with them exact distances and volumes.
+
+    Raises:
+        InputError: nothing is left of one.
+    """
+    filled: list[Body] = []
+    for body in bodies:
+        earlier = [other for other in filled if not certainly_apart(body.solid, other.solid)]
+        rest = body.solid
+        for other in earlier:
+            rest = rest - other.solid
+        empty, volume = TOUCHING * _volume_of_bounds(body.solid), rest.exact_volume()
+        body = replace(body, solid=rest, cut_by=tuple(other.name for other in earlier))
+        if earlier and (_volume_of_bounds(rest) <= empty or (volume is not None and volume <= empty)):
+            raise _no_room(f"{where}: charge {body.name!r}", body, "none, all of it lies in them")
+        filled.append(body)
+    return tuple(filled)
 
 
 def check_fit(where: str, bodies: Sequence[Body], domain: Domain, cell_size: np.ndarray) -> None:
@@ -79,8 +102,8 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
     """The bodies, cut into particles on the lattices of the domain's cells.
 
     Raises:
-        InputError: one gets no particle, two overlap, a velocity function does not give three finite numbers for each
-            position, or together they need more memory than the machine has.
+        InputError: one gets no particle, a velocity function does not give three finite numbers for each position, or
+            together they need more memory than the machine has.
     """
     volumes = [measure_volume(body.solid) for body in bodies]
     lattices = [Lattice(domain, body.particles_per_axis) for body in bodies]
@@ -90,6 +113,8 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
     for body, (volume, tolerance), lattice in zip(bodies, volumes, lattices, strict=True):
         positions = lattice.sites_in(body.solid)
         here = f"{where}: charge {body.name!r}"
+        if body.cut_by and (len(positions) == 0 or volume <= 0.0):
+            raise _no_room(here, body, "not enough for a single particle")
         if len(positions) == 0:
             raise mistake(here, "at least one particle in it", "none", "choose a smaller cell size")
         velocities = _initial_velocities(f"{here}: velocity", body.velocity, positions)
@@ -100,8 +125,6 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
                 *(per_axis, velocities, body.may_stay_unlit),
             )
         )
-    for first, second in combinations(charges, 2):
-        _check_apart(where, first, second)
     return tuple(charges)
 
 
@@ -165,12 +188,13 @@ def _check_memory(where: str, particle_count: float) -> None:
         )
 
 
-def _check_apart(where: str, first: Charge, second: Charge) -> None:
-    """Refuse two charges that overlap."""
-    if first.solid.contains(second.positions).any() or second.solid.contains(first.positions).any():
-        raise mistake(
-            f"{where}: charges {first.name!r} and {second.name!r}",
-            "bodies apart from each other",
-            "bodies that overlap",
-            f"cut one out of the other: {first.name} - {second.name}",
-        )
+def _no_room(here: str, body: Body, got: str) -> InputError:
+    """The error of a body that the ones before it leave no room."""
+    names = ", ".join(repr(name) for name in body.cut_by)
+    return mistake(here, f"room that the charges before it leave free ({names})", got, "move it, or add it before them")
+
+
+def _volume_of_bounds(solid: Solid) -> float:
+    """Volume of the box around a solid [m3]."""
+    lower, upper = solid.bounds()
+    return float(np.prod(upper - lower))

@@ -254,7 +254,7 @@ def _distance_from_excess(excess: np.ndarray) -> np.ndarray:
 
 def _overlap_volume(a: Solid, b: Solid) -> float | None:
     """Volume that two solids share [m3]; None where no formula is known."""
-    if _disjoint(a, b):
+    if certainly_apart(a, b):
         return 0.0
     if _covers(a, b):
         return b.exact_volume()
@@ -265,16 +265,20 @@ def _overlap_volume(a: Solid, b: Solid) -> float | None:
     return None
 
 
-def _disjoint(a: Solid, b: Solid) -> bool:
-    """True when the solids certainly share no volume."""
+def certainly_apart(a: Solid, b: Solid) -> bool:
+    """True when the solids certainly share no volume; they may touch."""
     if isinstance(a, Union):
-        return _disjoint(a.first, b) and _disjoint(a.second, b)
+        return certainly_apart(a.first, b) and certainly_apart(a.second, b)
     if isinstance(b, Union):
-        return _disjoint(b, a)
+        return certainly_apart(b, a)
+    if isinstance(a, Difference) and (certainly_apart(a.solid, b) or _covers(a.cut, b)):
+        return True
+    if isinstance(b, Difference) and (certainly_apart(a, b.solid) or _covers(b.cut, a)):
+        return True
     if isinstance(b, Sphere):
         return bool(a.signed_distance(np.array([b.center]))[0] >= b.radius * (1.0 - TOUCHING))
     if isinstance(a, Sphere):
-        return _disjoint(b, a)
+        return certainly_apart(b, a)
     (lower_a, upper_a), (lower_b, upper_b) = a.bounds(), b.bounds()
     slack = TOUCHING * np.max(upper_b - lower_b)
     return bool(np.any(upper_a <= lower_b + slack) or np.any(upper_b <= lower_a + slack))
@@ -282,12 +286,21 @@ def _disjoint(a: Solid, b: Solid) -> bool:
 
 def _covers(outer: Solid, inner: Solid) -> bool:
     """True when `inner` certainly lies within `outer`, surfaces that touch included."""
+    if outer == inner:
+        return True
     if isinstance(inner, Union):
         return _covers(outer, inner.first) and _covers(outer, inner.second)
+    if isinstance(outer, Union) and (_covers(outer.first, inner) or _covers(outer.second, inner)):
+        return True
+    if isinstance(outer, Difference):
+        return _covers(outer.solid, inner) and certainly_apart(outer.cut, inner)
     if isinstance(inner, Difference):
         return _covers(outer, inner.solid)
     if isinstance(inner, Sphere):
         return bool(outer.signed_distance(np.array([inner.center]))[0] <= -inner.radius * (1.0 - TOUCHING))
+    if isinstance(outer, Cylinder) and isinstance(inner, Cylinder):
+        shared = _nested_cylinders_overlap(outer, inner)
+        return shared is not None and shared >= inner.exact_volume() * (1.0 - TOUCHING)
     if isinstance(outer, Box | Sphere | Cylinder):  # convex: all corners inside, hence all between them
         lower, upper = inner.bounds()
         slack = TOUCHING * np.max(upper - lower)

@@ -32,7 +32,7 @@ def _sampled_volume(solid: Solid) -> tuple[float, float]:
     random = np.random.default_rng(seed=0)
     centers, size = _cells(*solid.bounds())
     core, surface = _core_and_surface(solid, centers, size)
-    while True:
+    while len(surface):
         cell_volume = float(np.prod(size))
         first, second = (solid.contains(surface + size * (random.random(surface.shape) - 0.5)) for _ in range(2))
         volume = core + (np.count_nonzero(first) + np.count_nonzero(second)) / 2 * cell_volume
@@ -42,6 +42,7 @@ def _sampled_volume(solid: Solid) -> tuple[float, float]:
             return volume, tolerance
         further_core, surface = _halved(solid, surface, size)
         core, size = core + further_core, size / 2
+    return core, 0.0  # no cell is left that a surface may cut: the solid is empty
 
 
 def _halved(solid: Solid, surface: np.ndarray, size: np.ndarray) -> tuple[float, np.ndarray]:
