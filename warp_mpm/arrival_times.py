@@ -12,7 +12,6 @@ import numpy as np
 import warp as wp
 
 from warp_mpm.checks import mistake
-from warp_mpm.geometry import Box, Cylinder, Sphere
 from warp_mpm.ignition import Source, sources_of
 from warp_mpm.kernels import arrival, eikonal
 from warp_mpm.kernels.arrival import Ignition
@@ -116,7 +115,7 @@ def _ignition(domain: Domain, source: Source, booster_radius: float) -> Ignition
 
 def _is_open(explosive: Explosive, explosives: Sequence[Explosive], cell: float) -> bool:
     """Whether nothing can be in the way: it is convex, and no other explosive comes within a cell [m]."""
-    if not isinstance(explosive.charge.solid, Box | Cylinder | Sphere):
+    if not explosive.charge.solid.convex:
         return False
     lower, upper = explosive.charge.solid.bounds()
     others = [one.charge.solid.bounds() for one in explosives if one is not explosive]

@@ -138,13 +138,17 @@ class SceneBuilder:
             name: for detonators and messages; without one "charge_1", "charge_2", ...
 
         Raises:
-            InputError: an argument is of the wrong kind, or the name is taken.
+            InputError: an argument is of the wrong kind, the solid is without end, or the name is taken.
         """
         name = f"charge_{len(self._bodies) + 1}" if name is None else name
         here = f"{self._here}: charge {name!r}"
         if any(body.name == name for body in self._bodies):
             raise mistake(here, "a name of its own", "one that another charge has")
         checks.instance(f"{here}: solid", solid, Solid, "a Solid, such as Box, Sphere or Cylinder")
+        if not np.isfinite(solid.bounds()).all():
+            raise mistake(
+                f"{here}: solid", "one that has an end", "one without", "intersect it with a box: solid & Box"
+            )
         checks.instance(f"{here}: material", material, Material, "a Material")
         per_axis = checks.count(f"{here}: particles_per_axis", particles_per_axis)
         if velocity is not None and not callable(velocity):

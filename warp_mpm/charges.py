@@ -1,5 +1,6 @@
 """Cuts bodies into charges of particles, after checking that they fit the domain, the cells and the memory."""
 
+import functools
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +9,7 @@ import numpy as np
 
 from warp_mpm.checks import mistake
 from warp_mpm.errors import InputError
-from warp_mpm.geometry import TOUCHING, Solid, certainly_apart
+from warp_mpm.geometry import TOUCHING, Solid, Union, certainly_apart
 from warp_mpm.lattice import Lattice
 from warp_mpm.materials import Material
 from warp_mpm.scene import Charge, Domain, Vector
@@ -17,6 +18,7 @@ from warp_mpm.volume import TARGET_TOLERANCE, measure_volume
 BYTES_PER_PARTICLE = 400  # positions while building, state, sorting and output together, rounded up
 LARGEST_VOLUME_DEVIATION = 0.2  # of a particle's volume from its lattice site's, before a warning
 OUTSIDE_TOLERANCE = 1e-9  # of the domain's size
+OUT_OF_PROPORTION = 100.0  # between a charge and the domain: the unit may be wrong
 
 # An initial velocity: one for all particles, or a function of their positions, (n, 3) [m] to (n, 3) [m/s].
 Velocity = Vector | Callable[[np.ndarray], np.ndarray]
@@ -50,10 +52,8 @@ def fill_what_is_free(where: str, bodies: Sequence[Body]) -> tuple[Body, ...]:
     """
     filled: list[Body] = []
     for body in bodies:
-        earlier = [other for other in filled if not certainly_apart(body.solid, other.solid)]
-        rest = body.solid
-        for other in earlier:
-            rest = rest - other.solid
+        earlier = [other for other in bodies[: len(filled)] if not certainly_apart(body.solid, other.solid)]
+        rest = body.solid - functools.reduce(Union, (other.solid for other in earlier)) if earlier else body.solid
         empty, volume = TOUCHING * _volume_of_bounds(body.solid), rest.exact_volume()
         body = replace(body, solid=rest, cut_by=tuple(other.name for other in earlier))
         if earlier and (_volume_of_bounds(rest) <= empty or (volume is not None and volume <= empty)):
@@ -86,7 +86,7 @@ def check_fit(where: str, bodies: Sequence[Body], domain: Domain, cell_size: np.
                     here,
                     f"inside the domain, {letter} from {low:g} to {high:g} m",
                     f"{letter} from {lower[axis]:g} to {upper[axis]:g} m",
-                    "enlarge the domain or move the charge",
+                    "enlarge the domain or move the charge" + _unit_hint(high - low, upper[axis] - lower[axis]),
                 )
             size, extent = particle_size[axis] / body.particles_per_axis, upper[axis] - lower[axis]
             if size > extent * (1.0 + OUTSIDE_TOLERANCE):
@@ -94,7 +94,7 @@ def check_fit(where: str, bodies: Sequence[Body], domain: Domain, cell_size: np.
                     here,
                     f"at least one particle across, {letter} extent {extent:g} m",
                     f"particles of {size:g} m",
-                    "choose a smaller cell size",
+                    "choose a smaller cell size" + _unit_hint(high - low, extent),
                 )
 
 
@@ -192,6 +192,12 @@ def _no_room(here: str, body: Body, got: str) -> InputError:
     """The error of a body that the ones before it leave no room."""
     names = ", ".join(repr(name) for name in body.cut_by)
     return mistake(here, f"room that the charges before it leave free ({names})", got, "move it, or add it before them")
+
+
+def _unit_hint(room: float, extent: float) -> str:
+    """What to say of an extent that is out of all proportion to the domain's [m]."""
+    far = max(room, extent) > OUT_OF_PROPORTION * min(room, extent)
+    return ", and check its unit: lengths are in metres, load_mesh(path, unit='mm') reads others" if far else ""
 
 
 def _volume_of_bounds(solid: Solid) -> float:

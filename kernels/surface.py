@@ -1,0 +1,101 @@
+"""Signed distances to closed surfaces of triangles, in single precision whatever the simulation's.
+
+The sign is that of the angle-weighted normal at the nearest point: Baerentzen and Aanaes, Signed distance computation
+using the angle weighted pseudonormal, IEEE TVCG 11(3), 2005.
+"""
+
+import warp as wp
+
+EDGE = wp.constant(wp.float32(1.0e-6))  # share of a vertex in a point of a face below which it is none
+
+# Where the outward normals of a face and of what bounds it are, after one another.
+NORMALS = wp.constant(7)
+FACE, FIRST_EDGE, FIRST_VERTEX = wp.constant(0), wp.constant(1), wp.constant(4)
+
+
+@wp.func
+def feature(u: wp.float32, v: wp.float32, w: wp.float32) -> int:
+    """What of a face a point with these shares of its three vertices lies on: the place of its normal.
+
+    Edge k runs from vertex k to the next one.
+    """
+    found = int(FACE)
+    if w < EDGE:
+        found = FIRST_EDGE
+    if u < EDGE:
+        found = FIRST_EDGE + 1
+    if v < EDGE:
+        found = FIRST_EDGE + 2
+    if v < EDGE and w < EDGE:
+        found = FIRST_VERTEX
+    if w < EDGE and u < EDGE:
+        found = FIRST_VERTEX + 1
+    if u < EDGE and v < EDGE:
+        found = FIRST_VERTEX + 2
+    return found
+
+
+@wp.kernel(enable_backward=False)
+def signed_distances(
+    surface: wp.uint64,
+    normals: wp.array(dtype=wp.vec3f),
+    reach: wp.float32,
+    points: wp.array(dtype=wp.vec3f),
+    distances: wp.array(dtype=wp.float32),
+):
+    """Distance of each point to the surface, negative inside, in the surface's own unit; none exceeds `reach`.
+
+    Warp's own sign adds up the normals of all places that are equally near, which fails on the axis of a round body.
+    """
+    i = wp.tid()
+    point = points[i]
+    nearest = wp.mesh_query_point_no_sign(surface, point, reach)
+    distance = reach
+    if nearest.result:
+        away = point - wp.mesh_eval_position(surface, nearest.face, nearest.u, nearest.v)
+        place = feature(nearest.u, nearest.v, wp.float32(1.0) - nearest.u - nearest.v)
+        distance = wp.length(away)
+        if wp.dot(away, normals[nearest.face * NORMALS + place]) < wp.float32(0.0):
+            distance = -distance
+    distances[i] = distance
+
+
+@wp.func
+def share_vertex(a: wp.vec3i, b: wp.vec3i) -> bool:
+    """Whether two faces, by the indices of their vertices, have one in common."""
+    shared = bool(False)
+    for i in range(3):
+        for j in range(3):
+            shared = shared or a[i] == b[j]
+    return shared
+
+
+@wp.func
+def corners(surface: wp.uint64, face: int) -> wp.vec3i:
+    """Indices of the vertices of a face."""
+    return wp.vec3i(
+        wp.mesh_get_index(surface, 3 * face),
+        wp.mesh_get_index(surface, 3 * face + 1),
+        wp.mesh_get_index(surface, 3 * face + 2),
+    )
+
+
+@wp.kernel(enable_backward=False)
+def find_cuts(surface: wp.uint64, cuts: wp.array(dtype=wp.int32)):
+    """How many other faces each face cuts; neighbours, which share a vertex, do not count."""
+    face = wp.tid()
+    mesh = wp.mesh_get(surface)
+    own = corners(surface, face)
+    p, q, r = mesh.points[own[0]], mesh.points[own[1]], mesh.points[own[2]]
+    zero = wp.vec3f(0.0, 0.0, 0.0)
+    size = wp.max(wp.length(q - p), wp.length(r - p))
+    query = wp.mesh_query_aabb(surface, wp.min(wp.min(p, q), r), wp.max(wp.max(p, q), r))
+    other = int(0)
+    count = int(0)
+    while wp.mesh_query_aabb_next(query, other):
+        theirs = corners(surface, other)
+        if other != face and not share_vertex(own, theirs):
+            a, b, c = mesh.points[theirs[0]] - p, mesh.points[theirs[1]] - p, mesh.points[theirs[2]] - p
+            if wp.intersect_tri_tri(zero, (q - p) / size, (r - p) / size, a / size, b / size, c / size) != 0:
+                count += 1
+    cuts[face] = count

@@ -1,0 +1,134 @@
+"""Closed surface meshes from files: STL, OBJ, PLY and Gmsh, read through meshio."""
+
+import contextlib
+import io
+import re
+import warnings
+from pathlib import Path
+from stat import S_ISREG
+
+import meshio
+import numpy as np
+
+from warp_mpm.checks import mistake, positive
+from warp_mpm.geometry import Mesh
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}  # [m]
+FORMATS = {".stl": "stl", ".obj": "obj", ".ply": "ply", ".msh": "gmsh"}
+
+# What a file of the format has if it is whole: without it readers go on for ever, or take the part for the whole.
+ENDINGS = {".ply": b"end_header", ".msh": b"$EndElements"}
+
+QUAD_HALVES = [[0, 1, 2], [0, 2, 3]]
+TETRAHEDRON_SIDES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]  # counter-clockwise seen from outside
+IGNORED = ("vertex", "line")  # cells that are no part of a surface
+
+
+def load_mesh(path: str | Path, *, unit: str | float = "m") -> Mesh:
+    """Read a solid from a file with its closed surface.
+
+    Triangles and quadrilaterals are its surface; where there are tetrahedra, their boundary is. Vertices at the same
+    place are merged. Nothing in the file is executed.
+
+    Args:
+        path: an STL, OBJ, PLY or Gmsh (.msh) file.
+        unit: of the file's coordinates: "m", "cm", "mm", "um", "in", "ft", or a number of metres.
+
+    Raises:
+        InputError: there is no such file, it cannot be read, or what is in it is not one closed surface whose faces
+            look outwards (see `Mesh`).
+    """
+    where = f"mesh {str(path)!r}"
+    length = _length(where, unit)
+    points, cells = _read(where, path)
+    return Mesh(length * points, _faces(where, points, cells), where)
+
+
+def _length(where: str, unit: str | float) -> float:
+    """A unit of length [m]."""
+    if not isinstance(unit, str):
+        return positive(f"{where}: unit", unit)
+    if unit not in UNITS:
+        raise mistake(f"{where}: unit", f"a number of metres or one of {', '.join(UNITS)}", repr(unit))
+    return UNITS[unit]
+
+
+def _read(where: str, path: str | Path) -> tuple[np.ndarray, list[meshio.CellBlock]]:
+    """Points (n, 3) and cells of a file. What meshio prints, and that it may end the program, does not get out."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in FORMATS:
+        raise mistake(where, f"a file that ends in {', '.join(FORMATS)}", repr(suffix))
+    try:
+        if not S_ISREG(Path(path).stat().st_mode):  # reading from a device or a pipe may never end
+            raise mistake(where, "a file", "something else")
+        content = Path(path).read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or f"{error}"
+        raise mistake(where, "a file that can be read", reason[:1].lower() + reason[1:]) from error
+    _check_whole(where, suffix, content)
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            mesh = meshio.read(path, file_format=FORMATS[suffix])
+            points = np.array(mesh.points, dtype=float)
+    except (Exception, SystemExit) as error:
+        reason = "" if isinstance(error, SystemExit) else f": {' '.join(f'{error}'.split()) or type(error).__name__}"
+        raise mistake(
+            where,
+            f"a whole {suffix[1:].upper()} file",
+            f"one that meshio cannot read{reason}",
+            "it may be truncated or damaged; export it again",
+        ) from error
+    if points.ndim == 2 and suffix == ".obj":
+        points = points[:, :3]  # colours may follow the coordinates
+    return points, mesh.cells
+
+
+def _check_whole(where: str, suffix: str, content: bytes) -> None:
+    """Refuse what would keep a reader busy for ever."""
+    ending = ENDINGS.get(suffix, b"")
+    if not content or ending not in content:
+        got = f"one without {ending.decode()}" if content else "an empty file"
+        raise mistake(where, f"a whole {suffix[1:].upper()} file", got, "it may be truncated; export it again")
+    if suffix == ".stl" and not content.lstrip().startswith(b"solid"):
+        triangles = int.from_bytes(content[80:84], "little")
+        if len(content) != 84 + 50 * triangles:
+            got = f"{len(content)} bytes for {triangles} triangles"
+            raise mistake(where, "a whole STL file", got, "it may be truncated; export it again")
+    if suffix == ".ply":
+        header = content[: content.index(ending)]
+        for name, count in re.findall(rb"element\s+(\w+)\s+(\d+)", header):
+            if int(count) > len(content):
+                got = f"{int(count)} of {name.decode()} in {len(content)} bytes"
+                raise mistake(where, "a whole PLY file", got, "it may be truncated; export it again")
+
+
+def _faces(where: str, points: np.ndarray, cells: list[meshio.CellBlock]) -> np.ndarray:
+    """The triangles (m, 3) of a surface, indices of points."""
+    found: dict[str, list[np.ndarray]] = {}
+    for block in cells:
+        if block.type not in IGNORED and len(block.data):
+            found.setdefault(block.type, []).append(np.asarray(block.data, dtype=np.int64))
+    if "tetra" in found:
+        return _boundary(where, points, np.concatenate(found["tetra"]))
+    unknown = set(found) - {"triangle", "quad"}
+    if unknown:
+        expected = "triangles, quadrilaterals or tetrahedra"
+        raise mistake(where, expected, ", ".join(sorted(unknown)), "export a surface of triangles")
+    triangles = [block.reshape(-1, 3) for block in found.get("triangle", [])]
+    halves = [block[:, QUAD_HALVES].reshape(-1, 3) for block in found.get("quad", [])]
+    return np.concatenate([*triangles, *halves]) if found else np.empty((0, 3), dtype=np.int64)
+
+
+def _boundary(where: str, points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """The sides of tetrahedra (n, 4) that belong to one of them alone, (m, 3), counter-clockwise seen from outside."""
+    if tetrahedra.min() < 0 or tetrahedra.max() >= len(points):
+        got = f"{tetrahedra.min()} to {tetrahedra.max()}"
+        raise mistake(where, f"cells between points 0 to {len(points) - 1}", got, "the file may be truncated")
+    a, b, c, d = (points[corner, :3] for corner in tetrahedra.T)
+    inverted = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) < 0.0
+    tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
+    sides = tetrahedra[:, TETRAHEDRON_SIDES].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
+    return sides[np.sort(first[count == 1])]
