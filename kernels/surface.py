@@ -6,7 +6,9 @@ using the angle weighted pseudonormal, IEEE TVCG 11(3), 2005.
 
 import warp as wp
 
-EDGE = wp.constant(wp.float32(1.0e-6))  # share of a vertex in a point of a face below which it is none
+from warp_mpm.kernels.precision import single, single_vector3
+
+EDGE = wp.constant(single(1.0e-6))  # share of a vertex in a point of a face below which it is none
 
 # Where the outward normals of a face and of what bounds it are, after one another.
 NORMALS = wp.constant(7)
@@ -14,7 +16,7 @@ FACE, FIRST_EDGE, FIRST_VERTEX = wp.constant(0), wp.constant(1), wp.constant(4)
 
 
 @wp.func
-def feature(u: wp.float32, v: wp.float32, w: wp.float32) -> int:
+def feature(u: single, v: single, w: single) -> int:
     """What of a face a point with these shares of its three vertices lies on: the place of its normal.
 
     Edge k runs from vertex k to the next one.
@@ -38,10 +40,10 @@ def feature(u: wp.float32, v: wp.float32, w: wp.float32) -> int:
 @wp.kernel(enable_backward=False)
 def signed_distances(
     surface: wp.uint64,
-    normals: wp.array(dtype=wp.vec3f),
-    reach: wp.float32,
-    points: wp.array(dtype=wp.vec3f),
-    distances: wp.array(dtype=wp.float32),
+    normals: wp.array(dtype=single_vector3),
+    reach: single,
+    points: wp.array(dtype=single_vector3),
+    distances: wp.array(dtype=single),
 ):
     """Distance of each point to the surface, negative inside, in the surface's own unit; none exceeds `reach`.
 
@@ -53,9 +55,9 @@ def signed_distances(
     distance = reach
     if nearest.result:
         away = point - wp.mesh_eval_position(surface, nearest.face, nearest.u, nearest.v)
-        place = feature(nearest.u, nearest.v, wp.float32(1.0) - nearest.u - nearest.v)
+        place = feature(nearest.u, nearest.v, single(1.0) - nearest.u - nearest.v)
         distance = wp.length(away)
-        if wp.dot(away, normals[nearest.face * NORMALS + place]) < wp.float32(0.0):
+        if wp.dot(away, normals[nearest.face * NORMALS + place]) < single(0.0):
             distance = -distance
     distances[i] = distance
 
@@ -87,7 +89,7 @@ def find_cuts(surface: wp.uint64, cuts: wp.array(dtype=wp.int32)):
     mesh = wp.mesh_get(surface)
     own = corners(surface, face)
     p, q, r = mesh.points[own[0]], mesh.points[own[1]], mesh.points[own[2]]
-    zero = wp.vec3f(0.0, 0.0, 0.0)
+    zero = single_vector3(0.0, 0.0, 0.0)
     size = wp.max(wp.length(q - p), wp.length(r - p))
     query = wp.mesh_query_aabb(surface, wp.min(wp.min(p, q), r), wp.max(wp.max(p, q), r))
     other = int(0)

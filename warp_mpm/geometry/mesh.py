@@ -11,6 +11,7 @@ from warp_mpm.geometry.closed_surface import check_closed, enclosed_volume, merg
 from warp_mpm.geometry.placement import Placement
 from warp_mpm.geometry.solid import Bounds, Solid
 from warp_mpm.kernels import surface
+from warp_mpm.kernels.precision import single, single_vector3
 from warp_mpm.warp_startup import start_quietly
 
 FLAT = 1e-9  # volume of a surface that encloses nothing, of its size cubed
@@ -59,10 +60,10 @@ class Mesh(Solid):
 
     def signed_distance(self, points: np.ndarray) -> np.ndarray:
         """Distance to the nearest triangle."""
-        near = ((points - self._center) / self._size).astype(np.float32)
+        near = ((points - self._center) / self._size).astype(wp.dtype_to_numpy(single))
         reach = 2.0 + float(np.abs(near).max(initial=0.0)) * 2.0  # farther than any vertex
-        distances = wp.zeros(len(near), dtype=wp.float32, device="cpu")
-        inputs = [self._surface.id, self._normals, reach, wp.array(near, dtype=wp.vec3f, device="cpu"), distances]
+        distances = wp.zeros(len(near), dtype=single, device="cpu")
+        inputs = [self._surface.id, self._normals, reach, wp.array(near, dtype=single_vector3, device="cpu"), distances]
         wp.launch(surface.signed_distances, len(near), inputs=inputs, device="cpu")
         return distances.numpy().astype(float) * self._size
 
@@ -97,13 +98,13 @@ class Mesh(Solid):
     @cached_property
     def _surface(self) -> wp.Mesh:
         """What Warp searches."""
-        points: wp.array = wp.array(self._near, dtype=wp.vec3f, device="cpu")
+        points: wp.array = wp.array(self._near, dtype=single_vector3, device="cpu")
         return wp.Mesh(points, wp.array(self.faces.ravel(), dtype=wp.int32, device="cpu"))
 
     @cached_property
     def _normals(self) -> wp.array:
         """What tells inside from outside, as `surface.signed_distances` takes it."""
-        return wp.array(outward_normals(self._near, self.faces).reshape(-1, 3), dtype=wp.vec3f, device="cpu")
+        return wp.array(outward_normals(self._near, self.faces).reshape(-1, 3), dtype=single_vector3, device="cpu")
 
     def _check_volume(self) -> None:
         """Refuse a surface that is inverted or flat."""
