@@ -1,4 +1,4 @@
-"""Signed distances to closed surfaces of triangles, in single precision whatever the simulation's.
+"""Signed distances to closed surfaces of triangles, in single precision whatever the simulation's, and self-cuts.
 
 The sign is that of the angle-weighted normal at the nearest point: Baerentzen and Aanaes, Signed distance computation
 using the angle weighted pseudonormal, IEEE TVCG 11(3), 2005.
@@ -9,6 +9,8 @@ import warp as wp
 from warp_mpm.kernels.precision import single, single_vector3
 
 EDGE = wp.constant(single(1.0e-6))  # share of a vertex in a point of a face below which it is none
+
+TOUCHING = wp.constant(wp.float64(1.0e-7))  # of the surface's size: what goes in less deep only touches
 
 # Where the outward normals of a face and of what bounds it are, after one another.
 NORMALS = wp.constant(7)
@@ -82,22 +84,39 @@ def corners(surface: wp.uint64, face: int) -> wp.vec3i:
     )
 
 
+@wp.func
+def pierces(a: wp.vec3d, b: wp.vec3d, p: wp.vec3d, q: wp.vec3d, r: wp.vec3d) -> bool:
+    """Whether the straight line from a to b goes through the triangle pqr, not only to it."""
+    normal = wp.cross(q - p, r - p)
+    depth = TOUCHING * wp.length(normal)
+    before, behind = wp.dot(a - p, normal), wp.dot(b - p, normal)
+    through = (before > depth and behind < -depth) or (before < -depth and behind > depth)
+    along = b - a
+    first = wp.dot(along, wp.cross(p - a, q - a))
+    second = wp.dot(along, wp.cross(q - a, r - a))
+    third = wp.dot(along, wp.cross(r - a, p - a))
+    zero = wp.float64(0.0)
+    within = (first >= zero and second >= zero and third >= zero) or (
+        first <= zero and second <= zero and third <= zero
+    )
+    return through and within
+
+
 @wp.kernel(enable_backward=False)
-def find_cuts(surface: wp.uint64, cuts: wp.array(dtype=wp.int32)):
-    """How many other faces each face cuts; neighbours, which share a vertex, do not count."""
+def find_cuts(surface: wp.uint64, vertices: wp.array(dtype=wp.vec3d), cuts: wp.array(dtype=wp.int32)):
+    """How many faces the edges of each face go through; neighbours, which share a vertex, do not count."""
     face = wp.tid()
     mesh = wp.mesh_get(surface)
     own = corners(surface, face)
     p, q, r = mesh.points[own[0]], mesh.points[own[1]], mesh.points[own[2]]
-    zero = single_vector3(0.0, 0.0, 0.0)
-    size = wp.max(wp.length(q - p), wp.length(r - p))
     query = wp.mesh_query_aabb(surface, wp.min(wp.min(p, q), r), wp.max(wp.max(p, q), r))
     other = int(0)
     count = int(0)
     while wp.mesh_query_aabb_next(query, other):
         theirs = corners(surface, other)
         if other != face and not share_vertex(own, theirs):
-            a, b, c = mesh.points[theirs[0]] - p, mesh.points[theirs[1]] - p, mesh.points[theirs[2]] - p
-            if wp.intersect_tri_tri(zero, (q - p) / size, (r - p) / size, a / size, b / size, c / size) != 0:
-                count += 1
+            a, b, c = vertices[theirs[0]], vertices[theirs[1]], vertices[theirs[2]]
+            for k in range(3):
+                if pierces(vertices[own[k]], vertices[own[(k + 1) % 3]], a, b, c):
+                    count += 1
     cuts[face] = count

@@ -88,6 +88,16 @@ def test_vertices_at_one_place_are_one_and_faces_without_extent_go():
     np.testing.assert_array_equal(cube.bounds(), [[0, 0, 0], [1, 1, 1]])
 
 
+def test_thin_and_fine_surfaces_do_not_cut_themselves():
+    """Faces long for their width lie close to others that they share no vertex with."""
+    needle = Mesh(cube_mesh()[0] * [1e-4, 1e-4, 1.0], cube_mesh()[1])
+    assert needle.exact_volume() == pytest.approx(1e-8)
+    wire = Mesh(*ring_mesh(1.0, 0.002, 200, 32))
+    assert wire.exact_volume() == pytest.approx(2 * math.pi**2 * 0.002**2, rel=0.01)
+    points = np.array([[1.0, 0.0, 0.0], [0.99, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    assert wire.contains(points).tolist() == [True, False, False]
+
+
 def test_a_shell_is_hollow():
     """The inner surface looks into the hollow: the volume is that between them."""
     outer, inner = cube_mesh(), cube_mesh(0.25, 0.75)
@@ -138,6 +148,11 @@ SURFACES = {
     ),
     "texts": ("cube", FACES, "expected numbers for vertices and faces, got something else"),
     "two that overlap": (*cubes((0, 1), (0.5, 1.5)), "faces that cut others, the first near"),
+    "one through the other": (
+        np.concatenate([VERTICES, VERTICES * [0.2, 0.2, 3.0] + [0.4, 0.4, -1.0]]),
+        np.concatenate([FACES, FACES + 8]),
+        "faces that cut others, the first near",
+    ),
     "one in the other": (*cubes((0, 1), (0.2, 0.8)), "got one around 1.22 m3 that has"),
     "one of two inverted": (*cubes((0, 1), (2, 2.5), turned=True), "that encloses its volume once, got one around"),
 }

@@ -44,8 +44,7 @@ def check_closed(where: str, vertices: np.ndarray, faces: np.ndarray) -> None:
         InputError: they do not.
     """
     ends = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    edges, which = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-    which = which.reshape(-1)
+    first, which = _edges(ends)
     count = np.bincount(which)
     balance = np.bincount(which, weights=np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0))  # 0 if both run opposite ways
     for wrong, got, remedy in (
@@ -54,7 +53,7 @@ def check_closed(where: str, vertices: np.ndarray, faces: np.ndarray) -> None:
         (balance != 0.0, "edges whose faces disagree which side is outside", "make its normals consistent"),
     ):
         if wrong.any():
-            place = ", ".join(f"{value:g}" for value in vertices[edges[np.argmax(wrong)]].mean(axis=0))
+            place = ", ".join(f"{value:g}" for value in vertices[ends[first[np.argmax(wrong)]]].mean(axis=0))
             expected = "a closed surface, each edge shared by two faces"
             raise mistake(where, expected, f"{np.count_nonzero(wrong)} {got}, the first near ({place}) m", remedy)
 
@@ -82,13 +81,19 @@ def outward_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     at_vertex = np.zeros_like(vertices)
     np.add.at(at_vertex, faces, angle[:, :, None] * normal[:, None, :])
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    _, which = np.unique(ends, axis=0, return_inverse=True)
+    _, which = _edges(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2))
     at_edge = np.zeros((which.max() + 1, 3))
-    np.add.at(at_edge, which.reshape(-1), np.repeat(normal, 3, axis=0))
+    np.add.at(at_edge, which, np.repeat(normal, 3, axis=0))
     of_vertices, of_edges = at_vertex[faces], at_edge[which.reshape(-1, 3)]
     of_face = np.where(normal.any(axis=1, keepdims=True), normal, of_vertices.sum(axis=1))
     return np.concatenate([of_face[:, None], of_edges, of_vertices], axis=1)
+
+
+def _edges(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which edges there are, by the first side of a face (n, 2) on each, and which of them each side lies on."""
+    low, high = ends.min(axis=1).astype(np.int64), ends.max(axis=1)
+    _, first, which = np.unique(low * (int(high.max()) + 1) + high, return_index=True, return_inverse=True)
+    return first, which.reshape(-1)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

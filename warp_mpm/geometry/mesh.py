@@ -1,6 +1,6 @@
 """Solids bounded by a closed surface of triangles."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -72,8 +72,11 @@ class Mesh(Solid):
         return enclosed_volume(self.vertices - self._center, self.faces)
 
     def placed(self, placement: Placement) -> "Mesh":
-        """Another mesh."""
-        return replace(self, vertices=placement.points(self.vertices))
+        """Another mesh; what was checked of this one is true of it."""
+        other = object.__new__(Mesh)
+        for name, value in (("vertices", placement.points(self.vertices)), ("faces", self.faces), ("name", self.name)):
+            object.__setattr__(other, name, value)
+        return other
 
     def hull(self) -> np.ndarray:
         """The vertices."""
@@ -118,10 +121,12 @@ class Mesh(Solid):
     def _check_cuts(self) -> None:
         """Refuse a surface that goes through itself."""
         found = wp.zeros(len(self.faces), dtype=wp.int32, device="cpu")
-        wp.launch(surface.find_cuts, len(self.faces), inputs=[self._surface.id, found], device="cpu")
+        vertices: wp.array = wp.array(self._near, dtype=wp.vec3d, device="cpu")
+        wp.launch(surface.find_cuts, len(self.faces), inputs=[self._surface.id, vertices, found], device="cpu")
         cuts = found.numpy()
         if cuts.any():
-            place = ", ".join(f"{value:g}" for value in self.vertices[self.faces[np.argmax(cuts > 0)]].mean(axis=0))
+            first = self.vertices[self.faces[np.argmax(cuts > 0)]].mean(axis=0)
+            place = ", ".join(f"{value:g}" for value in first)
             raise mistake(
                 self.name,
                 "a surface that does not go through itself",
