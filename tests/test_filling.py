@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from solids_for_tests import ring_mesh
 
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.detonators import PointDetonator
 from warp_mpm.errors import InputError
-from warp_mpm.geometry import Box, Cylinder, Solid, Sphere
+from warp_mpm.geometry import Box, Cone, Cylinder, HalfSpace, Mesh, Solid, Sphere
 from warp_mpm.materials import ammonium_nitrate
 from warp_mpm.scene import Scene
 from warp_mpm.volume import measure_volume
@@ -16,6 +17,10 @@ from warp_mpm.volume import measure_volume
 CUBE = Box((0, 0, 0), (1, 1, 1))
 MIDDLE = (0.5, 0.5, 0.5)
 BALL = Sphere(MIDDLE, 0.3)
+RING = Mesh(*ring_mesh(0.3, 0.12)).translated(MIDDLE)
+SLOPE = HalfSpace(MIDDLE, (1.0, 2.0, 3.0))
+SLANTED = Cylinder((0.2, 0.3, 0.2), (0.6, 0.7, 0.2), 0.1)
+TURNED = Box((0.3, 0.3, 0.3), (0.6, 0.6, 0.6)).rotated((0, 0, 1), 0.5, (0.3, 0.3, 0.3))
 ROD = Cylinder((0.5, 0.5, 0.0), (0.5, 0.5, 1.0), 0.2)
 
 
@@ -55,6 +60,12 @@ def test_later_charges_fill_what_is_free_and_together_all_of_it(solids, volumes)
         assert all(np.all(earlier.solid.signed_distance(charge.positions) >= 0) for earlier in scene.charges[:number])
 
 
+def test_what_is_filled_is_the_solid_of_the_charge():
+    """Arrival times, detonators and pictures see what the charge really fills."""
+    assert filled(BALL, CUBE).charges[1].solid == CUBE - BALL
+    assert filled(BALL, ROD, CUBE).charges[2].solid == CUBE - (BALL | ROD)
+
+
 def test_the_rest_of_any_shape_is_measured():
     """A ball that another one cuts a lens out of: pi (4 r + d)(2 r - d)^2 / 12."""
     first, second = Sphere((0.4, 0.5, 0.5), 0.2), Sphere((0.6, 0.5, 0.5), 0.2)
@@ -73,9 +84,17 @@ def test_the_rest_of_any_shape_is_measured():
         (CUBE - Cylinder((0.5, 0.5, -1.0), (0.5, 0.5, 2.0), 0.2), ROD),  # bored right through
         (Sphere((0.3, 0.5, 0.5), 0.2), Sphere((0.7, 0.5, 0.5), 0.2)),
         (Cylinder((0.5, 0.5, 0), (0.5, 0.5, 0.4), 0.3), Cylinder((0.5, 0.5, 0.4), (0.5, 0.5, 1), 0.2)),
+        (Cylinder((0.2, 0.2, 0.2), MIDDLE, 0.1), Cone(MIDDLE, (0.7, 0.7, 0.7), 0.1)),  # slanted, end to end
+        (SLANTED, SLANTED.translated((math.sqrt(0.02), -math.sqrt(0.02), 0))),  # side by side
+        (TURNED, TURNED.translated((0.3 * math.cos(0.5), 0.3 * math.sin(0.5), 0))),
+        (CUBE & SLOPE, CUBE - SLOPE),
+        (RING, CUBE - RING),
+        (RING, Sphere(MIDDLE, 0.15)),
+        (RING, Cylinder((0.5, 0.5, 0.1), (0.6, 0.5, 0.9), 0.08)),  # through the hole: a gap, and no plane between
+        (SLANTED, SLANTED.rotated((0, 0, 1), math.pi / 2, MIDDLE).translated((0, 0, 0.25))),  # crosswise, with a gap
     ],
 )
-def test_charges_that_touch_keep_their_shapes(solids):
+def test_charges_that_touch_or_are_apart_keep_their_shapes(solids):
     """So distances and volumes stay exact, in either order."""
     for order in (solids, solids[::-1]):
         assert [charge.solid for charge in filled(*order).charges] == list(order)
@@ -87,7 +106,7 @@ def test_charges_that_touch_keep_their_shapes(solids):
         ((CUBE, BALL), "none, all of it lies in them"),
         ((BALL, BALL), "none, all of it lies in them"),
         ((Box((0, 0, 0), (1, 1, 0.5)), Box((0, 0, 0.5), (1, 1, 1)), ROD), "none, all of it lies in them"),
-        ((BALL, Sphere((0.5002, 0.5, 0.5), 0.3)), "not enough for a single particle"),
+        ((Box((0.4, 0.4, 0.4), (0.6, 0.6, 0.6)), Sphere((0.6, 0.5, 0.5), 0.04)), "not enough for a single particle"),
     ],
 )
 def test_a_charge_that_finds_no_room_is_refused(solids, got):

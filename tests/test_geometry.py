@@ -91,8 +91,14 @@ def test_a_solid_elsewhere_is_the_same(solid):
 def test_a_solid_lies_between_the_points_of_its_hull(solid):
     inside = points_around(solid)[solid.contains(points_around(solid))]
     directions = np.random.default_rng(3).normal(size=(100, 3))
-    reach = SINGLE * size_of(solid) * np.linalg.norm(directions, axis=1)
-    assert np.all((inside @ directions.T).max(axis=0) <= (solid.hull() @ directions.T).max(axis=0) + reach)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    reach = SINGLE * size_of(solid)
+    along, hull = inside @ directions.T, solid.hull() @ directions.T
+    assert np.all(along.max(axis=0) <= hull.max(axis=0) + reach)
+    for number, direction in enumerate(directions):
+        low, high = solid.extent(direction)
+        assert low - reach <= along[:, number].min()
+        assert along[:, number].max() <= high + reach
 
 
 def test_what_solids_tell_of_each_other_is_true():

@@ -13,7 +13,7 @@ from warp_mpm.geometry import TOUCHING, Solid, Union, certainly_apart
 from warp_mpm.lattice import Lattice
 from warp_mpm.materials import Material
 from warp_mpm.scene import Charge, Domain, Vector
-from warp_mpm.volume import TARGET_TOLERANCE, measure_volume
+from warp_mpm.volume import TARGET_TOLERANCE, measure_volume, share_nothing
 
 BYTES_PER_PARTICLE = 400  # positions while building, state, sorting and output together, rounded up
 LARGEST_VOLUME_DEVIATION = 0.2  # of a particle's volume from its lattice site's, before a warning
@@ -45,14 +45,14 @@ class Body:
 def fill_what_is_free(where: str, bodies: Sequence[Body]) -> tuple[Body, ...]:
     """The bodies, each without what the ones before it take: none overlap any more.
 
-    Bodies that are certainly apart keep their solids as they are, and with them exact distances and volumes.
+    Bodies that are apart keep their solids as they are, and with them exact distances and volumes.
 
     Raises:
         InputError: nothing is left of one.
     """
     filled: list[Body] = []
     for body in bodies:
-        earlier = [other for other in bodies[: len(filled)] if not certainly_apart(body.solid, other.solid)]
+        earlier = [other for other in bodies[: len(filled)] if not _are_apart(body.solid, other.solid)]
         rest = body.solid - functools.reduce(Union, (other.solid for other in earlier)) if earlier else body.solid
         empty, volume = TOUCHING * _volume_of_bounds(body.solid), rest.exact_volume()
         body = replace(body, solid=rest, cut_by=tuple(other.name for other in earlier))
@@ -186,6 +186,11 @@ def _check_memory(where: str, particle_count: float) -> None:
             f"{particle_count:.2g}, which need {particle_count * BYTES_PER_PARTICLE / 1e9:.0f} GB",
             "choose a larger cell size or fewer particles per axis",
         )
+
+
+def _are_apart(first: Solid, second: Solid) -> bool:
+    """Whether two solids share nothing; those of odd shapes that touch may be taken for overlapping."""
+    return certainly_apart(first, second) or share_nothing(first, second)
 
 
 def _no_room(here: str, body: Body, got: str) -> InputError:

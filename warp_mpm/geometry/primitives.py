@@ -98,6 +98,10 @@ class TurnedBox(Solid):
         """The corners."""
         return self.box.hull() @ np.array(self.rotation).T
 
+    def normals_towards(self, other: Solid) -> list[np.ndarray]:
+        """Those of its faces."""
+        return list(np.array(self.rotation).T)
+
 
 @dataclass(frozen=True)
 class Sphere(Solid):
@@ -137,6 +141,11 @@ class Sphere(Solid):
     def placed(self, placement: Placement) -> "Sphere":
         """Another sphere."""
         return Sphere(placement.point(self.center), placement.factor * self.radius)
+
+    def extent(self, direction: np.ndarray) -> tuple[float, float]:
+        """A radius from the center to both sides."""
+        middle = float(np.array(self.center) @ direction)
+        return middle - self.radius, middle + self.radius
 
     def apart_from(self, other: Solid) -> bool:
         """The other is no nearer to the center than the radius."""
@@ -195,12 +204,17 @@ class HalfSpace(Solid):
         """Another half-space."""
         return HalfSpace(placement.point(self.point), _vector(placement.rotation @ self.direction))
 
-    def apart_from(self, other: Solid) -> bool:
-        """All of the other lies before the plane."""
-        if not np.isfinite(other.bounds()).all():
-            return False
-        hull = other.hull()
-        return bool(np.all(self.signed_distance(hull) >= -TOUCHING * np.ptp(hull, axis=0).max()))
+    def extent(self, direction: np.ndarray) -> tuple[float, float]:
+        """Without end, but along the normal."""
+        along = float(self.direction @ direction)
+        at = float(self.direction @ self.point) * along
+        if abs(along) < 1.0 - TOUCHING:
+            return -math.inf, math.inf
+        return (-math.inf, at) if along > 0.0 else (at, math.inf)
+
+    def normals_towards(self, other: Solid) -> list[np.ndarray]:
+        """Its own."""
+        return [self.direction]
 
     def flat_faces(self) -> Faces | None:
         """The plane, if it is normal to an axis."""

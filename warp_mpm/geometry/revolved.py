@@ -46,6 +46,22 @@ class Revolved(Solid):
         reach = np.outer(self.end_radii, np.sqrt(np.maximum(1.0 - self.direction**2, 0.0)))
         return (ends - reach).min(axis=0), (ends + reach).max(axis=0)
 
+    def extent(self, direction: np.ndarray) -> tuple[float, float]:
+        """That of its two ends."""
+        ends = np.array([self.start, self.end]) @ direction
+        reach = np.array(self.end_radii) * math.sqrt(max(1.0 - float(self.direction @ direction) ** 2, 0.0))
+        return float((ends - reach).min()), float((ends + reach).max())
+
+    def normals_towards(self, other: Solid) -> list[np.ndarray]:
+        """Its direction, and the one across it to the middle of the other."""
+        lower, upper = other.bounds()
+        if not np.isfinite([lower, upper]).all():
+            return [self.direction]
+        across = (lower + upper) / 2 - self.start
+        across -= (across @ self.direction) * self.direction
+        length = float(np.linalg.norm(across))
+        return [self.direction, across / length] if length > 0.0 else [self.direction]
+
     def covers(self, inner: Solid) -> bool:
         """Another round body along the same direction by its ends."""
         if not isinstance(inner, Revolved):

@@ -59,11 +59,26 @@ class Solid(ABC):
         lower, upper = self.bounds()
         return np.stack(np.meshgrid(*zip(lower, upper, strict=True), indexing="ij"), axis=-1).reshape(-1, 3)
 
+    def extent(self, direction: np.ndarray) -> tuple[float, float]:
+        """Coordinates [m] along a unit vector (3,) between which it lies."""
+        along = self.hull() @ direction
+        return float(along.min()), float(along.max())
+
+    def normals_towards(self, other: "Solid") -> list[np.ndarray]:
+        """Unit normals (3,) of planes that may part it from another."""
+        return []
+
     def apart_from(self, other: "Solid") -> bool:
         """True when this solid can tell that it shares no volume with another; both may touch."""
         (lower_a, upper_a), (lower_b, upper_b) = self.bounds(), other.bounds()
         slack = _slack(self, other)
-        return bool(np.any(upper_a <= lower_b + slack) or np.any(upper_b <= lower_a + slack))
+        if np.any(upper_a <= lower_b + slack) or np.any(upper_b <= lower_a + slack):
+            return True
+        for normal in self.normals_towards(other):
+            (low_a, high_a), (low_b, high_b) = self.extent(normal), other.extent(normal)
+            if high_a <= low_b + slack or high_b <= low_a + slack:
+                return True
+        return False
 
     def covers(self, inner: "Solid") -> bool:
         """True when this solid can tell that another lies within it; their surfaces may touch."""
@@ -166,6 +181,11 @@ class Union(Solid):
         """The points around both."""
         return np.concatenate([self.first.hull(), self.second.hull()])
 
+    def extent(self, direction: np.ndarray) -> tuple[float, float]:
+        """That of both."""
+        (low_a, high_a), (low_b, high_b) = self.first.extent(direction), self.second.extent(direction)
+        return min(low_a, low_b), max(high_a, high_b)
+
     def apart_from(self, other: Solid) -> bool:
         """Both are."""
         return certainly_apart(self.first, other) and certainly_apart(self.second, other)
@@ -232,6 +252,10 @@ class Difference(Solid):
         """The points around `solid`."""
         return self.solid.hull()
 
+    def extent(self, direction: np.ndarray) -> tuple[float, float]:
+        """That of `solid`."""
+        return self.solid.extent(direction)
+
     def apart_from(self, other: Solid) -> bool:
         """`solid` is, or the other lies in `cut`."""
         return certainly_apart(self.solid, other) or certainly_covers(self.cut, other)
@@ -282,6 +306,11 @@ class Intersection(Solid):
     def placed(self, placement: Placement) -> "Intersection":
         """Both elsewhere."""
         return Intersection(self.first.placed(placement), self.second.placed(placement))
+
+    def extent(self, direction: np.ndarray) -> tuple[float, float]:
+        """What those of both have in common."""
+        (low_a, high_a), (low_b, high_b) = self.first.extent(direction), self.second.extent(direction)
+        return max(low_a, low_b), min(high_a, high_b)
 
     def apart_from(self, other: Solid) -> bool:
         """Either is, or their common bounds are."""
