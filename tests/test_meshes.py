@@ -11,6 +11,7 @@ from hypothesis import strategies as some
 from solids_for_tests import cube_mesh, ring_mesh
 
 from warp_mpm.builder import SceneBuilder
+from warp_mpm.cli import main
 from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box, Mesh
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
@@ -207,6 +208,18 @@ def test_files_that_are_no_meshes_are_one_line(tmp_path, capfd, name):
     assert text.startswith(f"mesh '{tmp_path / name}': expected ")
     assert message in text
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", ["bytes.stl", "header.ply", "version.msh", "polygon.obj"])
+def test_the_command_line_says_it_in_one_line(tmp_path, capfd, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).write_bytes(FILES[name][0])
+    assert main(["run", "from_mesh", "--set", f"mesh={name}", "-o", "out"]) == 2
+    output, error = capfd.readouterr()
+    assert output == ""
+    assert error.startswith(f"warp-mpm: scene from_mesh: mesh '{name}': expected ")
+    assert error.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
 def test_what_is_no_file_is_one_line(tmp_path):
