@@ -51,8 +51,8 @@ def fill_what_is_free(where: str, bodies: Sequence[Body]) -> tuple[Body, ...]:
         InputError: nothing is left of one.
     """
     filled: list[Body] = []
-    for body in bodies:
-        earlier = [other for other in bodies[: len(filled)] if not _are_apart(body.solid, other.solid)]
+    for number, body in enumerate(bodies):
+        earlier = [other for other in bodies[:number] if not _are_apart(body.solid, other.solid)]
         rest = body.solid - functools.reduce(Union, (other.solid for other in earlier)) if earlier else body.solid
         empty, volume = TOUCHING * _volume_of_bounds(body.solid), rest.exact_volume()
         body = replace(body, solid=rest, cut_by=tuple(other.name for other in earlier))

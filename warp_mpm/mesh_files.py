@@ -6,6 +6,7 @@ import re
 import warnings
 from pathlib import Path
 from stat import S_ISREG
+from tempfile import TemporaryDirectory
 
 import meshio
 import numpy as np
@@ -41,7 +42,9 @@ def load_mesh(path: str | Path, *, unit: str | float = "m") -> Mesh:
     where = f"mesh {str(path)!r}"
     length = _length(where, unit)
     points, cells = _read(where, path)
-    return Mesh(length * points, _faces(where, points, cells), where)
+    with np.errstate(over="ignore"):  # what becomes infinite is refused
+        vertices = length * points
+    return Mesh(vertices, _faces(where, points, cells), where)
 
 
 def _length(where: str, unit: str | float) -> float:
@@ -54,7 +57,7 @@ def _length(where: str, unit: str | float) -> float:
 
 
 def _read(where: str, path: str | Path) -> tuple[np.ndarray, list[meshio.CellBlock]]:
-    """Points (n, 3) and cells of a file. What meshio prints, and that it may end the program, does not get out."""
+    """Points (n, 3) and cells of a file. That meshio may end the program does not get out."""
     suffix = Path(path).suffix.lower()
     if suffix not in FORMATS:
         raise mistake(where, f"a file that ends in {', '.join(FORMATS)}", repr(suffix))
@@ -66,12 +69,12 @@ def _read(where: str, path: str | Path) -> tuple[np.ndarray, list[meshio.CellBlo
         reason = getattr(error, "strerror", None) or f"{error}"
         raise mistake(where, "a file that can be read", reason[:1].lower() + reason[1:]) from error
     _check_whole(where, suffix, content)
-    said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            mesh = meshio.read(path, file_format=FORMATS[suffix])
-            points = np.array(mesh.points, dtype=float)
+        with TemporaryDirectory() as directory:
+            copy = Path(directory) / f"mesh{suffix}"  # of what was checked, whatever becomes of the file
+            copy.write_bytes(_plain(content) if suffix == ".stl" and _is_stl_text(content) else content)
+            mesh = _quietly_read(copy, FORMATS[suffix])
+        points = np.array(mesh.points, dtype=float)
     except (Exception, SystemExit) as error:
         reason = "" if isinstance(error, SystemExit) else f": {' '.join(f'{error}'.split()) or type(error).__name__}"
         raise mistake(
@@ -85,17 +88,39 @@ def _read(where: str, path: str | Path) -> tuple[np.ndarray, list[meshio.CellBlo
     return points, mesh.cells
 
 
+def _quietly_read(path: Path, file_format: str) -> meshio.Mesh:
+    """What meshio reads, without what it prints."""
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return meshio.read(path, file_format=file_format)
+
+
+def _plain(content: bytes) -> bytes:
+    """An STL file of text as meshio likes it: in small letters, without empty lines."""
+    lines = (line.strip().lower() for line in content.splitlines())
+    return b"\n".join(line for line in lines if line)
+
+
+def _is_stl_text(content: bytes) -> bool:
+    """Whether an STL file is one of text; some binary ones start like that too."""
+    return content.lstrip()[:5].lower() == b"solid" and len(content) != 84 + 50 * _stl_count(content)
+
+
+def _stl_count(content: bytes) -> int:
+    """Triangles that a binary STL file says it has."""
+    return int.from_bytes(content[80:84], "little")
+
+
 def _check_whole(where: str, suffix: str, content: bytes) -> None:
     """Refuse what would keep a reader busy for ever."""
     ending = ENDINGS.get(suffix, b"")
     if not content or ending not in content:
         got = f"one without {ending.decode()}" if content else "an empty file"
         raise mistake(where, f"a whole {suffix[1:].upper()} file", got, "it may be truncated; export it again")
-    if suffix == ".stl" and not content.lstrip().startswith(b"solid"):
-        triangles = int.from_bytes(content[80:84], "little")
-        if len(content) != 84 + 50 * triangles:
-            got = f"{len(content)} bytes for {triangles} triangles"
-            raise mistake(where, "a whole STL file", got, "it may be truncated; export it again")
+    if suffix == ".stl" and not _is_stl_text(content) and len(content) != 84 + 50 * _stl_count(content):
+        got = f"{len(content)} bytes for {_stl_count(content)} triangles"
+        raise mistake(where, "a whole STL file", got, "it may be truncated; export it again")
     if suffix == ".ply":
         header = content[: content.index(ending)]
         for name, count in re.findall(rb"element\s+(\w+)\s+(\d+)", header):
@@ -109,16 +134,16 @@ def _faces(where: str, points: np.ndarray, cells: list[meshio.CellBlock]) -> np.
     found: dict[str, list[np.ndarray]] = {}
     for block in cells:
         if block.type not in IGNORED and len(block.data):
-            found.setdefault(block.type, []).append(np.asarray(block.data, dtype=np.int64))
+            found.setdefault(block.type, []).append(block.data)
     if "tetra" in found:
-        return _boundary(where, points, np.concatenate(found["tetra"]))
+        return _boundary(where, points, np.concatenate(found["tetra"]).astype(np.int64))
     unknown = set(found) - {"triangle", "quad"}
     if unknown:
         expected = "triangles, quadrilaterals or tetrahedra"
         raise mistake(where, expected, ", ".join(sorted(unknown)), "export a surface of triangles")
-    triangles = [block.reshape(-1, 3) for block in found.get("triangle", [])]
+    triangles = found.get("triangle", [])
     halves = [block[:, QUAD_HALVES].reshape(-1, 3) for block in found.get("quad", [])]
-    return np.concatenate([*triangles, *halves]) if found else np.empty((0, 3), dtype=np.int64)
+    return np.concatenate([*triangles, *halves]).astype(np.int64) if found else np.empty((0, 3), dtype=np.int64)
 
 
 def _boundary(where: str, points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:

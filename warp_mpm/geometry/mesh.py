@@ -14,6 +14,7 @@ from warp_mpm.kernels import surface
 from warp_mpm.kernels.precision import single, single_vector3
 from warp_mpm.warp_startup import start_quietly
 
+LARGEST = 1e30  # coordinate [m]: volumes stay finite
 FLAT = 1e-9  # volume of a surface that encloses nothing, of its size cubed
 SAMPLES = 20_000  # points that tell whether the surface encloses its volume once
 STANDARD_ERRORS = 6.0  # that what they tell may be off
@@ -161,8 +162,9 @@ def _arrays(where: str, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.nda
         raise mistake(
             where, "a surface of triangles", "none", "is there a surface in it, and not only points or lines?"
         )
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
-        raise mistake(where, "three finite coordinates for each vertex", f"others among {len(vertices)} vertices")
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.all(np.abs(vertices) < LARGEST):
+        expected = f"three finite coordinates for each vertex, below {LARGEST:g} m"
+        raise mistake(where, expected, f"others among {len(vertices)} vertices")
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
         raise mistake(where, "three indices of vertices for each face", f"shape {faces.shape} of {faces.dtype}")
     if faces.min() < 0 or faces.max() >= len(vertices):
