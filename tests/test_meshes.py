@@ -206,6 +206,11 @@ FILES = {
     ),
     "header.ply": (HEADER % 3, "expected a whole PLY file, got one without end_header; it may be truncated"),
     "huge.ply": (PLY % 10**15, "expected a whole PLY file, got 1000000000000000 of face in"),
+    "short.ply": (
+        HEADER % 3
+        + b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n0 1 0\n1 0 0\n4 0 1 2\n",
+        "expected 4 corners for each quad, got 1 of other numbers",
+    ),
     "text.ply": (b"end_header", "expected a whole PLY file, got one that meshio cannot read"),
     "text.msh": (b"Guten Tag", "expected a whole MSH file, got one without $EndElements"),
     "version.msh": (b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n$EndElements", "meshio cannot read: Need mesh format in"),

@@ -20,6 +20,7 @@ FORMATS = {".stl": "stl", ".obj": "obj", ".ply": "ply", ".msh": "gmsh"}
 # What a file of the format has if it is whole: without it readers go on for ever, or take the part for the whole.
 ENDINGS = {".ply": b"end_header", ".msh": b"$EndElements"}
 
+CORNERS = {"triangle": 3, "quad": 4, "tetra": 4}
 QUAD_HALVES = [[0, 1, 2], [0, 2, 3]]
 TETRAHEDRON_SIDES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]  # counter-clockwise seen from outside
 IGNORED = ("vertex", "line")  # cells that are no part of a surface
@@ -135,12 +136,16 @@ def _faces(where: str, points: np.ndarray, cells: list[meshio.CellBlock]) -> np.
     for block in cells:
         if block.type not in IGNORED and len(block.data):
             found.setdefault(block.type, []).append(block.data)
-    if "tetra" in found:
-        return _boundary(where, points, np.concatenate(found["tetra"]).astype(np.int64))
-    unknown = set(found) - {"triangle", "quad"}
+    unknown = set(found) - set(CORNERS)
     if unknown:
         expected = "triangles, quadrilaterals or tetrahedra"
         raise mistake(where, expected, ", ".join(sorted(unknown)), "export a surface of triangles")
+    for kind, blocks in found.items():
+        for block in blocks:
+            if np.shape(block)[1:] != (CORNERS[kind],):
+                raise mistake(where, f"{CORNERS[kind]} corners for each {kind}", f"{len(block)} of other numbers")
+    if "tetra" in found:
+        return _boundary(where, points, np.concatenate(found["tetra"]).astype(np.int64))
     triangles = found.get("triangle", [])
     halves = [block[:, QUAD_HALVES].reshape(-1, 3) for block in found.get("quad", [])]
     return np.concatenate([*triangles, *halves]).astype(np.int64) if found else np.empty((0, 3), dtype=np.int64)
