@@ -262,18 +262,15 @@ def test_from_mesh():
     scene = load_scene("from_mesh", cell_size=8e-3)
     (body,) = scene.charges
     area = 32 / 2 * 0.02**2 * np.sin(2 * np.pi / 32)
-    assert body.volume == pytest.approx(
-        96 * np.sin(2 * np.pi / 96) * 0.06 * area, rel=1e-6
-    )  # STL is in single precision
+    volume = 96 * np.sin(2 * np.pi / 96) * 0.06 * area
+    assert body.volume == pytest.approx(volume, rel=1e-6)  # an STL file is in single precision
     assert body.mass == pytest.approx(1000.0 * body.solid.exact_volume(), rel=1e-14)
     assert body.volume_tolerance == 0.0
     result = simulate(scene, save=Save(frames=2, figures=False))
     lamp = PointDetonator((-0.08, 0.0, 0.0))
     assert scene.detonators[0].position == pytest.approx(lamp.position, abs=1e-6)
     middle = np.abs(body.positions[:, 2]) < 4e-3  # the next layers have to go over the hole's curved side
-    exact = inert_sphere(
-        body.positions, radius=0.04, detonator=PointDetonator((-0.08, 0.0, 0.0)), speed=2800.0, cylinder=True
-    )
+    exact = inert_sphere(body.positions, radius=0.04, detonator=lamp, speed=2800.0, cylinder=True)
     times = result.state.field("arrival_time").astype(np.float64)
     assert np.abs(times - exact)[middle].max() * 2800.0 / 8e-3 < 0.1
     gauge = result.record.gauges["opposite"]
@@ -285,9 +282,7 @@ def test_from_mesh_takes_any_mesh(tmp_path):
     write_ring(tmp_path / "part.stl")
     scene = load_scene("from_mesh", mesh=str(tmp_path / "part.stl"), unit="cm", cell_size=8e-2)
     assert scene.mass == pytest.approx(1000.0 * load_scene("from_mesh", cell_size=8e-3).mass)
-    with pytest.raises(
-        InputError, match=r"scene from_mesh: mesh 'none.stl': expected a file that can be read, got no such"
-    ):
+    with pytest.raises(InputError, match=r"scene from_mesh: mesh 'none.stl': expected a file that can be read, got no"):
         load_scene("from_mesh", mesh="none.stl")
 
 
