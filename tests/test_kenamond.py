@@ -1,9 +1,14 @@
 """Kenamond's problems on small grids: travel times to a tenth of a cell, and the speed that particles see to 0.5 %."""
 
+import numpy as np
 import pytest
+from scenes_for_tests import start
 
+from warp_mpm.detonators import PointDetonator
+from warp_mpm.exact import kenamond
+from warp_mpm.places import section_nodes
 from warp_mpm.verification.problem import Level
-from warp_mpm.verification.problems.kenamond import SPEED_TOLERANCE, Kenamond
+from warp_mpm.verification.problems.kenamond import LAMP, RADIUS, SPEED, SPEED_TOLERANCE, Kenamond
 from warp_mpm.verification.session import Setup, solve_level
 
 
@@ -26,3 +31,17 @@ def test_errors_do_not_grow_with_the_grid():
         for cells in (24, 48)
     )
     assert fine["time_cells"] < 1.5 * coarse["time_cells"]
+
+
+def test_what_is_recorded_is_expected_when_it_burns():
+    """At the nodes of the section, around the obstacle, and never inside it."""
+    scene = Kenamond().scene(Level(40, {"problem": 3, "dimensions": 2}))
+    expected = start(scene).state.expected.section
+    nodes = section_nodes(scene).reshape(-1, 3)
+    assert scene.section.axis == 2
+    exact = kenamond.inert_sphere(nodes, radius=RADIUS, detonator=PointDetonator(LAMP), speed=SPEED, cylinder=True)
+    cell = scene.domain.spacing[0]
+    error = (expected.ravel() - exact) * SPEED / cell
+    away = np.abs(np.linalg.norm(nodes, axis=1) - RADIUS) > 0.02 * cell  # at the surface either may be right
+    np.testing.assert_array_equal(np.isnan(error[away]), np.isnan(exact[away]))
+    assert np.nanmax(np.abs(error)) < 0.1

@@ -17,8 +17,9 @@ from warp_mpm.kernels import arrival, eikonal
 from warp_mpm.kernels.arrival import Ignition
 from warp_mpm.kernels.passage import Passage
 from warp_mpm.kernels.precision import NEVER, scalar, vector3
-from warp_mpm.kernels.records import Grid, Particles
+from warp_mpm.kernels.records import BurnTimes, Grid, Particles, Position
 from warp_mpm.kernels.routes import Route
+from warp_mpm.places import cells_of
 from warp_mpm.scene import Charge, Domain, Scene
 
 LATTICE_PER_CELL = 2  # spacings of the lattice a cell: an obstacle of one cell is seen
@@ -63,7 +64,9 @@ class Medium:
         return np.min([explosive.charge.solid.signed_distance(points) for explosive in self.explosives], axis=0)
 
 
-def light_particles(scene: Scene, particles: Particles, grid: Grid, device: wp.Device) -> None:
+def light_particles(
+    scene: Scene, particles: Particles, grid: Grid, device: wp.Device, places: np.ndarray
+) -> np.ndarray:
     """Set the arrival and booster times of particles that are in creation order.
 
     Args:
@@ -71,20 +74,67 @@ def light_particles(scene: Scene, particles: Particles, grid: Grid, device: wp.D
         particles: whose `burn_times` are set; before, they are never.
         grid: the cells.
         device: where they are.
+        places: where else the times are wanted (n, 3) [m].
+
+    Returns:
+        When the first wave comes to the places (n,) [s]; NaN where none does, and outside of the explosives.
 
     Raises:
         InputError: no wave comes to an explosive that may not stay unlit.
     """
-    explosives = _explosives(scene)
-    hindered = [one for one in explosives if not _is_open(one, explosives, max(scene.domain.spacing))]
-    for explosive in explosives:
-        straight = explosive.remote if explosive in hindered else explosive.near + explosive.remote
+    waves = _Waves(scene, grid, device)
+    times = np.full(len(places), float(NEVER))
+    for explosive in waves.explosives:
+        waves.light(explosive, particles, explosive.begin, len(explosive.charge.positions))
+        slack = TOLERANCE * min(scene.domain.spacing)
+        within = np.flatnonzero(explosive.charge.solid.signed_distance(places) <= slack)
+        if len(within):
+            probes = _probes(scene.domain, places[within], device)
+            waves.light(explosive, probes, 0, len(within))
+            times[within] = np.minimum(times[within], probes.burn_times.numpy()["arrival_time"])
+    _check_reached(scene, waves.explosives, particles)
+    return np.where(times < float(NEVER), times, np.nan)
+
+
+class _Waves:
+    """What the waves of a scene are computed from: detonators, and nodes' routes where something is in the way."""
+
+    def __init__(self, scene: Scene, grid: Grid, device: wp.Device) -> None:
+        self.explosives = _explosives(scene)
+        self._grid, self._device = grid, device
+        cell = max(scene.domain.spacing)
+        hindered = [one for one in self.explosives if not _is_open(one, self.explosives, cell)]
+        self._media = _media(hindered)
+        self._ignitions = [_array(medium.ignitions, Ignition, device) for medium in self._media]
+        if hindered:
+            self._passage = _passage(scene.domain, self._media, device)
+            self._nodes = _nodes(scene.domain, self._media, device)
+            _settle_nodes(self._passage, self._nodes, self._media, self._ignitions, device)
+
+    def light(self, explosive: Explosive, particles: Particles, begin: int, count: int) -> None:
+        """Set the arrival and booster times of `count` particles of an explosive, from `begin` on."""
+        medium = next((n for n, medium in enumerate(self._media) if explosive in medium.explosives), None)
+        straight = explosive.remote if medium is not None else explosive.near + explosive.remote
         if straight:
-            inputs = [particles, grid, _array(straight, Ignition, device), explosive.speed, explosive.begin]
-            wp.launch(arrival.light, len(explosive.charge.positions), inputs=inputs, device=device)
-    if hindered:
-        _light_around(scene, _media(hindered), particles, grid, device)
-    _check_reached(scene, explosives, particles)
+            ignitions = _array(straight, Ignition, self._device)
+            inputs = [particles, self._grid, ignitions, explosive.speed, begin]
+            wp.launch(arrival.light, count, inputs=inputs, device=self._device)
+        if medium is not None:
+            inputs = [particles, self._grid, self._passage, self._nodes, self._ignitions[medium], medium, begin]
+            wp.launch(eikonal.light_around, count, inputs=inputs, device=self._device)
+
+
+def _probes(domain: Domain, places: np.ndarray, device: wp.Device) -> Particles:
+    """Particles that are nothing but places (n, 3) [m], not yet lit."""
+    position = np.zeros(len(places), dtype=Position.numpy_dtype())
+    position["cell"], position["fraction"] = cells_of(domain, places)
+    times = np.zeros(len(places), dtype=BurnTimes.numpy_dtype())
+    for name in BurnTimes.vars:
+        times[name] = NEVER
+    probes = Particles()
+    probes.position = wp.array(position, dtype=Position, device=device)
+    probes.burn_times = wp.array(times, dtype=BurnTimes, device=device)
+    return probes
 
 
 def _explosives(scene: Scene) -> list[Explosive]:
@@ -133,19 +183,18 @@ def _media(explosives: Sequence[Explosive]) -> list[Medium]:
     return [Medium(tuple(group)) for group in by_speed]
 
 
-def _light_around(scene: Scene, media: Sequence[Medium], particles: Particles, grid: Grid, device: wp.Device) -> None:
-    """Arrival times where the waves have to go around something or through several explosives."""
-    passage = _passage(scene.domain, media, device)
-    nodes = _nodes(scene.domain, media, device)
+def _settle_nodes(
+    passage: Passage,
+    nodes: eikonal.Nodes,
+    media: Sequence[Medium],
+    ignitions: Sequence[wp.array],
+    device: wp.Device,
+) -> None:
+    """Give all nodes to which waves come their routes, around what is in the way and through several explosives."""
     wp.launch(eikonal.place_nodes, (len(media), nodes.count), inputs=[passage, nodes], device=device)
-    ignitions = [_array(medium.ignitions, Ignition, device) for medium in media]
     for number, lit_by in enumerate(ignitions):
         wp.launch(eikonal.light_nodes, nodes.count, inputs=[passage, nodes, number, lit_by], device=device)
     _run_waves(passage, nodes, max(medium.speed for medium in media), device)
-    for number, medium in enumerate(media):
-        for explosive in medium.explosives:
-            inputs = [particles, grid, passage, nodes, ignitions[number], number, explosive.begin]
-            wp.launch(eikonal.light_around, len(explosive.charge.positions), inputs=inputs, device=device)
 
 
 def _run_waves(passage: Passage, nodes: eikonal.Nodes, fastest: float, device: wp.Device) -> None:

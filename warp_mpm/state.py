@@ -22,6 +22,7 @@ from warp_mpm.kernels.records import (
 )
 from warp_mpm.kernels.walls import REACTIONS
 from warp_mpm.model import Model
+from warp_mpm.places import recorded_places
 
 GRID_SLOTS = 8  # pieces into which the work on nodes is cut on a CPU
 CACHE_LINE = 64  # [bytes]; a node's eight lanes never lie in two
@@ -69,7 +70,9 @@ class State:
         # Twice the count: the sort uses the second half as its scratch.
         self._keys = wp.zeros(2 * self.count, dtype=wp.int64, device=self.device)
         self._order = wp.zeros(2 * self.count, dtype=int, device=self.device)
-        light_particles(model.scene, self.particles, self.grid, self.device)
+        places = recorded_places(model.scene)
+        times = light_particles(model.scene, self.particles, self.grid, self.device, places.joined)
+        self.expected = places.parted(times)  # when the detonation comes to where it is recorded [s]
         self.sorts = 0
         self.ranges = self.sort()
 

@@ -21,6 +21,7 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from warp_mpm.detonators import Detonator, PlaneDetonator
 from warp_mpm.output import colormap
+from warp_mpm.places import section_nodes
 from warp_mpm.scene import Scene, Wall
 
 WORLD = "/World"
@@ -128,13 +129,6 @@ def particle_widths(contents: Contents) -> np.ndarray:
     return np.cbrt(contents.particles_every * shown).astype(np.float32)
 
 
-def section_axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates of the domain's nodes along the two axes of the section plane [m]: (nodes_u,), (nodes_v,) float64."""
-    domain = scene.domain
-    u, v = (np.linspace(domain.lower[a], domain.upper[a], domain.cells[a] + 1) for a in scene.section.in_plane)
-    return u, v
-
-
 def _author_particles(stage: Any, contents: Contents, material: Any) -> None:
     points = UsdGeom.Points.Define(stage, PARTICLES)
     points.CreatePointsAttr()
@@ -152,12 +146,10 @@ def _author_particles(stage: Any, contents: Contents, material: Any) -> None:
 
 def _author_section(stage: Any, scene: Scene, material: Any) -> None:
     """The nodes in the section plane and the quadrilaterals between them; node (i, j) is point i nodes_v + j."""
-    u, v = section_axes(scene)
-    plane = np.full((len(u), len(v), 3), scene.section.coordinate)
-    first, second = scene.section.in_plane
-    plane[..., first], plane[..., second] = u[:, None], v[None, :]
-    corner = (np.arange(len(u) - 1)[:, None] * len(v) + np.arange(len(v) - 1)).ravel()
-    quads = np.stack([corner, corner + len(v), corner + len(v) + 1, corner + 1], axis=1)
+    plane = section_nodes(scene)
+    rows, columns = plane.shape[:2]
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    quads = np.stack([corner, corner + columns, corner + columns + 1, corner + 1], axis=1)
 
     mesh = UsdGeom.Mesh.Define(stage, SECTION)
     points = Vt.Vec3fArray.FromNumpy(plane.reshape(-1, 3).astype(np.float32))
@@ -165,7 +157,7 @@ def _author_section(stage: Any, scene: Scene, material: Any) -> None:
     mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(quads), 4, dtype=np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(quads.ravel().astype(np.int32)))
-    normal = np.cross(*np.eye(3, dtype=np.float32)[[first, second]])
+    normal = np.cross(*np.eye(3, dtype=np.float32)[list(scene.section.in_plane)])
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.tile(normal, (len(points), 1))))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
