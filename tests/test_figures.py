@@ -13,6 +13,7 @@ from runs_for_tests import GAUGES, GPA, first_frame, left_by, run_of
 from scenes_for_tests import OPEN, block
 
 from warp_mpm.config import Save
+from warp_mpm.detonators import CordDetonator, LineDetonator, SphereDetonator
 from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.output.description import scene_values
 from warp_mpm.output.figures import PICTURES, draw_figures
@@ -113,6 +114,25 @@ def test_detonators_are_hollow_until_they_are_lit(scene, tmp_path):
     np.testing.assert_allclose(places, [(100.0, 80.0 * k) for k in range(6)], atol=1e-9)
     lit = [[mark.get_markerfacecolor() != "none" for mark in panel] for panel in marks]
     assert lit == [[True, True, True, False, False, False], [True, True, True, True, True, False]]  # 0.5 us apart
+
+
+def test_detonators_that_are_no_points_are_lines(tmp_path):
+    """Dotted, and solid as far as they are lit; what is seen end-on is a dot."""
+    detonators = (
+        CordDetonator(((0.01, 0.01, 0.01), (0.05, 0.01, 0.01)), speed=8000.0, time=1e-6),
+        SphereDetonator((0.03, 0.05, 0.01), 0.01, time=3e-6),
+        LineDetonator((0.05, 0.07, 0.0), (0.05, 0.07, 0.02)),
+    )
+    scene = block((6, 8, 2), detonators=detonators)
+    (axes,) = panels_of(section_figure(left_by(tmp_path, scene, pictures=pictures_of(scene, 6)[2:3])))  # at 3 us
+    solid = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xydata()) > 1]
+    cord, sphere = solid
+    np.testing.assert_allclose(cord, [[10.0, 10.0], [26.0, 10.0]], rtol=1e-6)
+    np.testing.assert_allclose(np.hypot(*(sphere - [30.0, 50.0]).T), 10.0, rtol=1e-6)
+    dotted = [line.get_xydata() for line in axes.lines if line.get_linestyle() == ":"]
+    np.testing.assert_allclose(dotted[0], [[10.0, 10.0], [50.0, 10.0]], rtol=1e-6)
+    (dot,) = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    np.testing.assert_allclose(dot, [[50.0, 70.0]], rtol=1e-6)
 
 
 def test_section_shows_a_free_charge_and_its_gas_only(tmp_path):

@@ -28,7 +28,7 @@ from warp_mpm.kernels.record import (
     record_step,
 )
 from warp_mpm.output.frame import GaugeRecord, LineRecord, StepRecord
-from warp_mpm.places import cells_of, recorded_places
+from warp_mpm.places import Places, cells_of, recorded_places
 from warp_mpm.scene import Domain, Scene, Segment, Vector
 from warp_mpm.section import SectionRecorder
 from warp_mpm.state import NUMBER, State
@@ -77,6 +77,11 @@ class Recorder:
         self._peaks_taken = 0
         self._gauges_taken = 0
         self._sorts_seen = 0
+
+    @property
+    def expected(self) -> Places:
+        """When the detonation comes to where the state is recorded [s]."""
+        return self._state.expected
 
     def record(self) -> None:
         """Record the state as it is now: once before the first step, then after each."""
@@ -144,7 +149,6 @@ class Recorder:
         first_point = RECORD_HEAD + self._regions
         first_on_line = first_point + len(self._places.path)
         on_path, on_line = rows[:, first_point:first_on_line], rows[:, first_on_line : self._first_gauge]
-        expected = self._state.expected
         on_gauges = self._gauge_lanes(rows)
         return StepRecord(
             time=time,
@@ -153,8 +157,8 @@ class Recorder:
             field_pressure=rows[:, RECORD_FIELD_PRESSURE],
             path_pressure=rows[:, RECORD_HEAD] if has_path else None,
             point_pressures=rows[:, RECORD_HEAD + int(has_path) : first_point],
-            path=_line_record(time, self._places.path, expected.path, on_path),
-            line=_line_record(time, self._places.line, expected.line, on_line),
+            path=_line_record(time, self._places.path, self.expected.path, on_path),
+            line=_line_record(time, self._places.line, self.expected.line, on_line),
             gauges={
                 gauge.name: _gauge_record(time, on_gauges[:, number]) for number, gauge in enumerate(self._scene.gauges)
             },
