@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 from scenes_for_tests import start
 
+from warp_mpm.config import SolverConfig
 from warp_mpm.detonators import PointDetonator
 from warp_mpm.exact import kenamond
+from warp_mpm.launch import Launcher, find_device
+from warp_mpm.model import build_model
 from warp_mpm.places import section_nodes
+from warp_mpm.state import State
 from warp_mpm.verification.problem import Level
 from warp_mpm.verification.problems.kenamond import LAMP, RADIUS, SPEED, SPEED_TOLERANCE, Kenamond
 from warp_mpm.verification.session import Setup, solve_level
@@ -15,13 +19,24 @@ from warp_mpm.verification.session import Setup, solve_level
 @pytest.mark.parametrize("problem", [1, 2, 3])
 @pytest.mark.parametrize(("dimensions", "cells"), [(2, 40), (3, 24)])
 def test_times_and_speeds(problem, dimensions, cells):
-    """Half a cell of travel is what is promised. A sphere of four cells' radius is poor on a lattice of half cells."""
+    """Half a cell of travel is what is promised."""
     level = Level(cells, {"problem": problem, "dimensions": dimensions})
     figures = solve_level(Kenamond(), level, Setup(device="cpu", threads=1)).figures
     assert figures["time_cells"] < 0.1
     assert figures["speed_rare"] < 0.01
-    if dimensions == 2:
+    if dimensions == 2 or problem != 2:  # in three dimensions an interface of few cells' radius is still poor
         assert figures["speed"] < SPEED_TOLERANCE
+
+
+def test_any_number_of_threads_gives_the_same_times():
+    """Problem 3 in three dimensions: routes, and ways pulled taut, whichever thread comes first."""
+    model = build_model(
+        Kenamond().scene(Level(36, {"problem": 3, "dimensions": 3})), SolverConfig(), find_device("cpu")
+    )
+    launcher = Launcher(model.device, threads=3)
+    shared, alone = State(model, launcher), State(model)
+    launcher.close()
+    np.testing.assert_array_equal(shared.field("arrival_time"), alone.field("arrival_time"))
 
 
 def test_errors_do_not_grow_with_the_grid():

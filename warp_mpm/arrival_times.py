@@ -7,6 +7,7 @@ detonation speed: the union of its charges, as signed distances on a lattice fin
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import warp as wp
@@ -19,6 +20,8 @@ from warp_mpm.kernels.passage import Passage
 from warp_mpm.kernels.precision import NEVER, scalar, vector3
 from warp_mpm.kernels.records import BurnTimes, Grid, Particles, Position
 from warp_mpm.kernels.routes import Route
+from warp_mpm.kernels.taut import Fan
+from warp_mpm.launch import SMALLEST_SHARED_WORK, Launcher
 from warp_mpm.places import cells_of
 from warp_mpm.scene import Charge, Domain, Scene
 
@@ -29,6 +32,7 @@ REACH = 0.51  # how far outside its charge a detonator may lie [cells]; half a c
 WINDOW = 0.5  # how far the fastest wave runs while nodes are settled together [cells]
 WINDOWS_AT_ONCE = 8  # between two looks at how far the waves have come
 SAME_SPEED = 1e-6  # relative difference of the speeds of one medium
+PARTS_A_THREAD = 8  # of a launch: some parts have far more to do than others
 CHUNK = 200_000  # lattice points whose distances are computed at a time
 
 
@@ -65,7 +69,7 @@ class Medium:
 
 
 def light_particles(
-    scene: Scene, particles: Particles, grid: Grid, device: wp.Device, places: np.ndarray
+    scene: Scene, particles: Particles, grid: Grid, launcher: Launcher, places: np.ndarray
 ) -> np.ndarray:
     """Set the arrival and booster times of particles that are in creation order.
 
@@ -73,7 +77,7 @@ def light_particles(
         scene: the charges and what lights them.
         particles: whose `burn_times` are set; before, they are never.
         grid: the cells.
-        device: where they are.
+        launcher: launches on the device where they are.
         places: where else the times are wanted (n, 3) [m].
 
     Returns:
@@ -82,14 +86,14 @@ def light_particles(
     Raises:
         InputError: no wave comes to an explosive that may not stay unlit.
     """
-    waves = _Waves(scene, grid, device)
+    waves = _Waves(scene, grid, launcher)
     times = np.full(len(places), float(NEVER))
     for explosive in waves.explosives:
         waves.light(explosive, particles, explosive.begin, len(explosive.charge.positions))
         slack = TOLERANCE * min(scene.domain.spacing)
         within = np.flatnonzero(explosive.charge.solid.signed_distance(places) <= slack)
         if len(within):
-            probes = _probes(scene.domain, places[within], device)
+            probes = _probes(scene.domain, places[within], launcher.device)
             waves.light(explosive, probes, 0, len(within))
             times[within] = np.minimum(times[within], probes.burn_times.numpy()["arrival_time"])
     _check_reached(scene, waves.explosives, particles)
@@ -99,9 +103,10 @@ def light_particles(
 class _Waves:
     """What the waves of a scene are computed from: detonators, and nodes' routes where something is in the way."""
 
-    def __init__(self, scene: Scene, grid: Grid, device: wp.Device) -> None:
+    def __init__(self, scene: Scene, grid: Grid, launcher: Launcher) -> None:
+        device = launcher.device
         self.explosives = _explosives(scene)
-        self._grid, self._device = grid, device
+        self._grid, self._launcher = grid, launcher
         cell = max(scene.domain.spacing)
         hindered = [one for one in self.explosives if not _is_open(one, self.explosives, cell)]
         self._media = _media(hindered)
@@ -109,19 +114,19 @@ class _Waves:
         if hindered:
             self._passage = _passage(scene.domain, self._media, device)
             self._nodes = _nodes(scene.domain, self._media, device)
-            _settle_nodes(self._passage, self._nodes, self._media, self._ignitions, device)
+            _settle_nodes(self._passage, self._nodes, self._media, self._ignitions, launcher)
 
     def light(self, explosive: Explosive, particles: Particles, begin: int, count: int) -> None:
         """Set the arrival and booster times of `count` particles of an explosive, from `begin` on."""
         medium = next((n for n, medium in enumerate(self._media) if explosive in medium.explosives), None)
         straight = explosive.remote if medium is not None else explosive.near + explosive.remote
         if straight:
-            ignitions = _array(straight, Ignition, self._device)
-            inputs = [particles, self._grid, ignitions, explosive.speed, begin]
-            wp.launch(arrival.light, count, inputs=inputs, device=self._device)
+            ignitions = _array(straight, Ignition, self._launcher.device)
+            inputs = [particles, self._grid, ignitions, explosive.speed]
+            _launch(self._launcher, arrival.light, count, inputs, begin)
         if medium is not None:
-            inputs = [particles, self._grid, self._passage, self._nodes, self._ignitions[medium], medium, begin]
-            wp.launch(eikonal.light_around, count, inputs=inputs, device=self._device)
+            inputs = [particles, self._grid, self._passage, self._nodes, self._ignitions[medium], medium]
+            _launch(self._launcher, eikonal.light_around, count, inputs, begin)
 
 
 def _probes(domain: Domain, places: np.ndarray, device: wp.Device) -> Particles:
@@ -188,17 +193,18 @@ def _settle_nodes(
     nodes: eikonal.Nodes,
     media: Sequence[Medium],
     ignitions: Sequence[wp.array],
-    device: wp.Device,
+    launcher: Launcher,
 ) -> None:
     """Give all nodes to which waves come their routes, around what is in the way and through several explosives."""
-    wp.launch(eikonal.place_nodes, (len(media), nodes.count), inputs=[passage, nodes], device=device)
+    wp.launch(eikonal.place_nodes, (len(media), nodes.count), inputs=[passage, nodes], device=launcher.device)
     for number, lit_by in enumerate(ignitions):
-        wp.launch(eikonal.light_nodes, nodes.count, inputs=[passage, nodes, number, lit_by], device=device)
-    _run_waves(passage, nodes, max(medium.speed for medium in media), device)
+        _launch(launcher, eikonal.light_nodes, nodes.count, [passage, nodes, number, lit_by])
+    _run_waves(passage, nodes, max(medium.speed for medium in media), launcher)
 
 
-def _run_waves(passage: Passage, nodes: eikonal.Nodes, fastest: float, device: wp.Device) -> None:
+def _run_waves(passage: Passage, nodes: eikonal.Nodes, fastest: float, launcher: Launcher) -> None:
     """Settle all nodes to which a wave comes, in the order of their times."""
+    device = launcher.device
     open_nodes = _array(_open_nodes(nodes), int, device)
     duration = WINDOW * float(nodes.size) / fastest
     window, end = 0, 0.0
@@ -208,13 +214,25 @@ def _run_waves(passage: Passage, nodes: eikonal.Nodes, fastest: float, device: w
         wp.launch(eikonal.find_next, len(open_nodes), inputs=[nodes, open_nodes, following], device=device)
         earliest = float(following.numpy()[0])
         if earliest >= float(NEVER):
-            return
+            break
         end = max(end, earliest)
         for _ in range(WINDOWS_AT_ONCE):
             end += duration
             window += 1
-            wp.launch(eikonal.settle, len(open_nodes), inputs=[nodes, open_nodes, window, end], device=device)
-            wp.launch(eikonal.spread, len(open_nodes), inputs=[passage, nodes, open_nodes, window], device=device)
+            _launch(launcher, eikonal.settle, len(open_nodes), [nodes, open_nodes, window, end])
+            _launch(launcher, eikonal.spread, len(open_nodes), [passage, nodes, open_nodes, window])
+    wp.launch(eikonal.look_around, len(nodes.certain), inputs=[nodes], device=device)
+    _launch(launcher, eikonal.spread_fans, len(open_nodes), [passage, nodes, open_nodes])
+
+
+def _launch(launcher: Launcher, kernel: wp.Kernel, count: int, inputs: Sequence[object], begin: int = 0) -> None:
+    """Launch a kernel that takes the first of its indices last, in parts that the launcher's threads share."""
+    shared = launcher.threads > 1 and count >= SMALLEST_SHARED_WORK
+    parts = launcher.threads * PARTS_A_THREAD if shared else 1
+    cuts = np.linspace(0, count, parts + 1).astype(int)
+    pairs = [(int(low), int(high)) for low, high in pairwise(cuts) if high > low]
+    tasks = [[launcher.record(kernel, high - low, [*inputs, begin + low])] for low, high in pairs]
+    launcher.run(tasks, count)
 
 
 def _open_nodes(nodes: eikonal.Nodes) -> np.ndarray:
@@ -283,6 +301,7 @@ def _nodes(domain: Domain, media: Sequence[Medium], device: wp.Device) -> eikona
     total = nodes.count * nodes.media
     nodes.place = wp.zeros(total, dtype=vector3, device=device)
     nodes.route = wp.zeros(total, dtype=Route, device=device)
+    nodes.fan = wp.zeros(total, dtype=Fan, device=device)
     nodes.window = wp.zeros(total, dtype=int, device=device)
     nodes.touched = wp.zeros(total, dtype=int, device=device)
     nodes.certain = wp.zeros(total, dtype=int, device=device)
