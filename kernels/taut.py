@@ -23,8 +23,8 @@ from warp_mpm.kernels.passage import (
 from warp_mpm.kernels.precision import HALF, NEVER, ONE, TWO, ZERO, matrix2, scalar, vector2, vector3, vector4
 from warp_mpm.kernels.routes import FIXED, Route
 
-FAST = wp.constant(1)
-TURNS = wp.constant(2)
+FAST = wp.constant(1)  # kinds of fans: the last corner stays where it is,
+TURNS = wp.constant(2)  # or moves along the surface
 MOST = wp.constant(24)  # corners that move; what lies before them stays as it is
 STEPS = wp.constant(5)
 STILL = wp.constant(scalar(2.0e-3))  # a movement that is none: of the step along lines
@@ -44,15 +44,13 @@ Media = wp.types.vector(24, wp.int32)
 class Fan:
     """The last leg of a node's way, and what holds its corner when its end is moved: the wave around the node."""
 
-    kind: int  # 0: none; FAST: the corner stays where it is; TURNS: it moves along the surface
+    kind: int  # FAST or TURNS; 0: there is none
     corner: vector3  # [m]
     corner_time: scalar  # [s]
     pull: vector3  # derivative of the time up to the corner with respect to it [s/m]; 0 if the corner stays
     first: vector3  # unit vectors along the surface; 0 if the corner stays
     second: vector3
-    stiffness: (
-        matrix2  # second derivatives of the time up to the corner along them, the other corners moving too [s/m2]
-    )
+    stiffness: matrix2  # second derivatives along them of the time up to the corner, all others moving too [s/m2]
 
 
 @wp.struct
