@@ -19,7 +19,7 @@ class Cells:
     spacing: np.ndarray  # (3,) [m]
     filled: np.ndarray  # (nx, ny, nz) bool: there is a particle
     pressure: np.ndarray  # (nx, ny, nz) float64, mean over its particles [Pa]; 0 without any
-    share: np.ndarray  # (nx, ny, nz) float64, particles over those in a full cell at the start
+    share: np.ndarray  # (nx, ny, nz) float64, volume at the start of its particles, over the cell's
 
     def centres(self, axis: int) -> np.ndarray:
         """Coordinates of the cells' centres along an axis [m]."""
@@ -29,7 +29,7 @@ class Cells:
 def frame_cells(run: Run, frame: SavedFrame) -> Cells:
     """The cells of a frame that hold particles."""
     frame = run.frames[frame.index]  # its own, which goes with all that it has read when the cells are there
-    return _count(run, frame.position[frame.inside], frame.pressure[frame.inside])
+    return _count(run, frame.position[frame.inside], frame.pressure[frame.inside], _particle_volume(run))
 
 
 def charge_cells(run: Run) -> list[Cells]:
@@ -41,8 +41,12 @@ def charge_cells(run: Run) -> list[Cells]:
     first, ids = frames_of(run)[0], run.frames.ids
     ends = np.cumsum([charge["particles"] for charge in run.summary["charges"]])
     owner = np.searchsorted(ends, ids, side="right")
-    own = [owner == number for number in range(len(ends))]
-    return [_count(run, first.position[mine], first.pressure[mine]) for mine in own]
+    parts = []
+    for number, charge in enumerate(run.summary["charges"]):
+        mine = owner == number
+        volume = charge["volume_m3"] / max(1, np.count_nonzero(mine))
+        parts.append(_count(run, first.position[mine], first.pressure[mine], volume))
+    return parts
 
 
 def joined(parts: list[Cells]) -> tuple[Cells, np.ndarray]:
@@ -53,7 +57,7 @@ def joined(parts: list[Cells]) -> tuple[Cells, np.ndarray]:
     return replace(parts[0], filled=np.any([part.filled for part in parts], axis=0)), owner
 
 
-def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
+def _count(run: Run, position: np.ndarray, pressure: np.ndarray, particle_volume: float) -> Cells:
     domain = setup_of(run).domain
     lower = np.array(domain.lower)
     shape = np.maximum(np.array(domain.cells) // _merged(run), 1)
@@ -63,7 +67,7 @@ def _count(run: Run, position: np.ndarray, pressure: np.ndarray) -> Cells:
     count = np.bincount(flat, minlength=shape.prod())
     total = np.bincount(flat, weights=pressure, minlength=shape.prod())
     mean = total / np.maximum(count, 1)
-    share = count * (_particle_volume(run) / spacing.prod())
+    share = count * (particle_volume / spacing.prod())
     return Cells(lower, spacing, (count > 0).reshape(shape), mean.reshape(shape), share.reshape(shape))
 
 

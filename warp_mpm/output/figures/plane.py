@@ -97,18 +97,26 @@ def _draw_cut(axes: Axes, plane: PlaneDetonator, setup: SceneDescription, time: 
 
 
 def draw_outlines(panels: Iterable[Axes], run: Run, color: str = "white") -> None:
-    """Where each charge was at first, if it does not fill the domain: the edge of the cells with particles."""
+    """Where each charge was at first, if it does not fill the domain: where half of the volume is its own.
+
+    So charges that touch have one line between them.
+    """
     setup, axis = setup_of(run), setup_of(run).section.axis
-    outlines = []
-    for cells in charge_cells(run) if run.file is not None else ():
+    parts = charge_cells(run) if run.file is not None else []
+    layers = []
+    for cells in parts:
         layer = (setup.section.coordinate - cells.lower[axis]) / cells.spacing[axis]
-        inside = np.take(cells.filled, np.clip(int(layer), 0, cells.filled.shape[axis] - 1), axis=axis)
-        if inside.any() and not inside.all():
+        layers.append(np.take(cells.share, np.clip(int(layer), 0, cells.share.shape[axis] - 1), axis=axis))
+    whole = np.maximum(np.sum(layers, axis=0), 1.0)
+    outlines = []
+    for cells, share in zip(parts, layers, strict=True):
+        own = share / whole
+        if own.min() < 0.5 < own.max():
             u, v = (cells.centres(other) / MILLIMETRE for other in setup.section.in_plane)
-            outlines.append((u, v, inside.T.astype(float)))
+            outlines.append((u, v, own.T))
     for axes in panels:
         for outline in outlines:
-            axes.contour(*outline, levels=[0.5], colors=color, linewidths=0.6, linestyles="--")
+            axes.contour(*outline, levels=[0.5], colors=color, linewidths=0.6)
 
 
 def window_of(run: Run, seen: np.ndarray) -> Window:
