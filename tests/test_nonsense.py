@@ -1,7 +1,7 @@
 """Commands, paths and files that make no sense are refused in one line."""
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as some
 
 from warp_mpm.cli import main
@@ -9,7 +9,6 @@ from warp_mpm.config import Save
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import simulate
 
-FEW = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 words = some.one_of(
     some.text(max_size=12), some.sampled_from(("nan", "inf", "-1", "0", "1e999", "é", "../..", "=", "a=b=c"))
 )
@@ -19,7 +18,6 @@ options = some.sampled_from(
 )
 
 
-@FEW
 @given(some.lists(some.tuples(options, some.booleans(), names, words), min_size=1, max_size=3))
 def test_a_command_that_makes_no_sense_is_one_line(tmp_path_factory, given):
     """Whatever follows an option: one line and exit code 2; nothing in it names a scene that exists."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warp_mpm.detonators import Detonator
 from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.exact.reflection import collision_pressure
 from warp_mpm.materials import Material
@@ -66,12 +67,16 @@ def ideal_arrival(scene: Scene, points: np.ndarray, speed: float) -> np.ndarray:
     return straight_arrival(scene.detonators, points, speed)
 
 
+def _lighting(scene: Scene, material: Material) -> list[Detonator]:
+    """The detonators that light charges of a material."""
+    names = {charge.name for charge in scene.charges if charge.material is material}
+    return [detonator for detonator in scene.detonators if names.intersection(detonator.charges)]
+
+
 def _path_arrival(scene: Scene, points: np.ndarray, material: Material) -> np.ndarray:
     """Ideal arrival times (n,) [s] from the detonators that light charges of a material, at its own speed."""
-    names = {charge.name for charge in scene.charges if charge.material is material}
-    lighting = [detonator for detonator in scene.detonators if names.intersection(detonator.charges)]
     assert material.burn is not None
-    return straight_arrival(lighting, points, material.burn.detonation_speed)
+    return straight_arrival(_lighting(scene, material), points, material.burn.detonation_speed)
 
 
 def arrival_times(record: LineRecord, threshold: float) -> np.ndarray:
@@ -88,19 +93,20 @@ def arrival_times(record: LineRecord, threshold: float) -> np.ndarray:
 
 def front_speed(scene: Scene, record: StepRecord, material: Material) -> FrontSpeed | None:
     """Speed of the front along the front path; None if it did not run far enough to tell."""
-    if record.path is None or material.cj is None or material.burn is None:
+    if record.path is None or material.cj is None or not _lighting(scene, material):
         return None
     distance = record.path.distance
     arrived = arrival_times(record.path, ARRIVAL_SHARE * material.cj.pressure)
     low, high = (share * distance[-1] for share in FITTED_PART)
     used = np.isfinite(arrived) & (distance >= low) & (distance <= high)
-    if used.sum() < 3:
-        return None
     time = arrived[used]
+    if len(time) < 3 or np.ptp(time) == 0.0:
+        return None
     speed, start = np.polyfit(time, distance[used], 1)
     residual = float(np.abs(distance[used] - (speed * time + start)).max())
     assert scene.front_path is not None
     ideal = _path_arrival(scene, scene.front_path.points(len(distance))[used], material)
+    assert material.burn is not None
     offset = float(material.burn.detonation_speed * np.mean(ideal - time))
     return FrontSpeed(float(speed), residual, offset)
 
@@ -126,7 +132,7 @@ def meeting_points(scene: Scene, record: StepRecord, material: Material) -> list
             continue
         low = _arrival_fit(record.line.distance, arrived, below[-1], place)
         high = _arrival_fit(record.line.distance, arrived, above[0], place)
-        met.append((high[1] - low[1]) / (low[0] - high[0]) if low and high else None)
+        met.append((high[1] - low[1]) / (low[0] - high[0]) if low and high and low[0] != high[0] else None)
     return met
 
 
@@ -147,7 +153,7 @@ def collision_theory(material: Material) -> float:
 
 def front_pressure(scene: Scene, record: StepRecord, material: Material) -> float | None:
     """Median over steps of the highest field pressure around the front path, late on its way [Pa]."""
-    if record.path_pressure is None or material.burn is None or scene.front_path is None:
+    if record.path_pressure is None or scene.front_path is None or not _lighting(scene, material):
         return None
     ends = np.array([scene.front_path.start, scene.front_path.end])
     start, end = _path_arrival(scene, ends, material)
