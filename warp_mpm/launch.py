@@ -13,6 +13,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mpm import checks
 from warp_mpm.errors import InputError
 from warp_mpm.warp_startup import start_quietly
 
@@ -32,8 +33,8 @@ class Launcher:
 
     def __init__(self, device: wp.Device, threads: int | None = None, graphs: bool | None = None) -> None:
         available = available_cores()
-        if threads is not None and threads < 1:
-            raise InputError(f"threads: expected at least 1, got {threads}; leave it out for all {available} cores")
+        if threads is not None:
+            checks.count("threads", threads)
         self.device = device
         self.graphs = device.is_cuda if graphs is None else graphs
         self.threads = 1 if self.graphs or kernels_are_checked() else (threads or available)
