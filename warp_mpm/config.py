@@ -7,6 +7,8 @@ from warp_mpm.checks import count, flag, instance, names, positive, shortened
 from warp_mpm.errors import InputError
 from warp_mpm.kernels.numbers import is_number
 
+MOST_FRAMES = 1_000_000  # of a run; each is a file for a while, and more than anyone looks at
+
 
 class ShapeFunction(Enum):
     """How a particle's extent is spread over the nodes."""
@@ -115,6 +117,8 @@ class Save:
         """
         if count("save: frames", self.frames) < 2:
             raise InputError(f"save: frames: expected at least 2, the first and the last, got {self.frames}")
+        if self.frames > MOST_FRAMES:
+            raise InputError(f"save: frames: expected at most {MOST_FRAMES}, got {self.frames}")
         flag("save: figures", self.figures)
         flag("save: usdz", self.usdz)
         instance("save: layout", self.layout, Layout, "a Layout, such as Layout.CLIPS")
