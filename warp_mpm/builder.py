@@ -149,7 +149,9 @@ class SceneBuilder:
         checks.instance(f"{here}: material", material, Material, "a Material")
         per_axis = checks.count(f"{here}: particles_per_axis", particles_per_axis)
         if velocity is not None and not callable(velocity):
-            velocity = checks.vector(f"{here}: velocity", velocity)
+            velocity = checks.vector(
+                f"{here}: velocity", velocity, "give (vx, vy, vz) [m/s], or a function of positions"
+            )
         checks.flag(f"{here}: may_stay_unlit", may_stay_unlit)
         self._bodies.append(Body(name, solid, material, per_axis, velocity, may_stay_unlit))
 

@@ -96,7 +96,7 @@ def names(where: str, value: Any) -> tuple[str, ...]:
     return parts
 
 
-def vector(where: str, value: Any) -> Vector:
+def vector(where: str, value: Any, remedy: str = "") -> Vector:
     """`value` as three floats.
 
     Raises:
@@ -105,8 +105,11 @@ def vector(where: str, value: Any) -> Vector:
     expected = "three finite numbers"
     parts = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
     if len(parts) != 3:
-        raise mistake(where, expected, shortened(value))
-    x, y, z = (finite(where, part, expected) for part in parts)
+        raise mistake(where, expected, shortened(value), remedy)
+    for part in parts:
+        if not is_number(part):
+            raise mistake(where, expected, shortened(part), remedy)
+    x, y, z = (float(part) for part in parts)
     return (x, y, z)
 
 
