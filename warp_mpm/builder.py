@@ -334,7 +334,7 @@ class SceneBuilder:
     def _segment(self, name: str, start: Sequence[float], end: Sequence[float]) -> Segment:
         here = f"{self._here}: {name}"
         segment = Segment(checks.vector(f"{here}: start", start), checks.vector(f"{here}: end", end))
-        if segment.start == segment.end:
+        if segment.length == 0.0:  # their difference may be too small for a number
             raise mistake(f"{here}: end", "another point than start", segment.end)
         return segment
 
