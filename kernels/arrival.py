@@ -7,7 +7,7 @@ Reference: Wilkins 1999; the paper, section 2.3.
 
 import warp as wp
 
-from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
+from warp_mpm.kernels.precision import NEVER, ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import Grid, Particles
 
 
@@ -87,6 +87,15 @@ def arrival_time(ignition: Ignition, position: vector3, detonation_speed: scalar
 
 
 @wp.func
+def first_arrival(ignitions: wp.array(dtype=Ignition), position: vector3, detonation_speed: scalar) -> scalar:
+    """The least of the arrival times from several detonators [s]."""
+    arrival = NEVER
+    for n in range(ignitions.shape[0]):
+        arrival = wp.min(arrival, arrival_time(ignitions[n], position, detonation_speed))
+    return arrival
+
+
+@wp.func
 def particle_position(particles: Particles, grid: Grid, p: int) -> vector3:
     """Position of a particle relative to the domain's lower corner [m]."""
     position = particles.position[p]
@@ -112,8 +121,6 @@ def light(particles: Particles, grid: Grid, ignitions: wp.array(dtype=Ignition),
     """Arrival and booster times of particles from the detonators that light them, whatever lies between."""
     p = begin + wp.tid()
     position = particle_position(particles, grid, p)
-    arrival = particles.burn_times[p].arrival_time
-    for n in range(ignitions.shape[0]):
-        arrival = wp.min(arrival, arrival_time(ignitions[n], position, detonation_speed))
-    particles.burn_times[p].arrival_time = arrival
+    arrival = first_arrival(ignitions, position, detonation_speed)
+    particles.burn_times[p].arrival_time = wp.min(particles.burn_times[p].arrival_time, arrival)
     boost(particles, p, ignitions, position)

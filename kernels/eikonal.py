@@ -18,17 +18,21 @@ Theta*: any-angle path planning on grids, AAAI (2007) 1177 (ways that go on from
 
 import warp as wp
 
-from warp_mpm.kernels.arrival import Ignition, boost, particle_position
+from warp_mpm.kernels.arrival import Ignition, boost, first_arrival, particle_position
 from warp_mpm.kernels.passage import Passage, distance_at, is_clear, onto_surface
-from warp_mpm.kernels.precision import HALF, NEVER, TWO, ZERO, scalar, vector3
+from warp_mpm.kernels.precision import HALF, NEVER, ONE, TWO, ZERO, scalar, vector3
 from warp_mpm.kernels.records import Grid, Particles
 from warp_mpm.kernels.routes import FIXED, Route, expected_gain, onward, straight_route
+from warp_mpm.kernels.taut import Fan, taut_fan, time_over
 
 ABSENT = wp.constant(-2)  # a node outside its medium
 OPEN = wp.constant(-1)  # a node not yet settled; settled ones have the number of their window
 ALIKE = wp.constant(scalar(1.0e-3))  # of a cell: places that are the same
 NEGLIGIBLE = wp.constant(scalar(2.0e-4))  # of a cell: a gain that is not worth its computation
 SMALL = wp.constant(scalar(0.004))  # of a cell: a gain that second order is good enough for
+AGREED = wp.constant(scalar(0.025))  # of a cell of travel: nodes that differ more do not speak of the same wave
+ALL_AGREED = wp.constant(scalar(0.02))  # of a cell of travel: nodes that differ less need not be questioned
+GOOD = wp.constant(scalar(0.05))  # of a cell of travel: a gain that second order is good enough for
 MARGIN = wp.constant(scalar(0.3))  # of a cell: what moving a corner may gain between neighbours
 
 
@@ -38,9 +42,10 @@ class Nodes:
 
     place: wp.array(dtype=vector3)  # relative to the domain's lower corner [m]
     route: wp.array(dtype=Route)
+    fan: wp.array(dtype=Fan)  # the wave around the node, where it comes around something
     window: wp.array(dtype=int)  # in which it was settled, or OPEN, or ABSENT
     touched: wp.array(dtype=int)  # window in which a neighbour was settled
-    certain: wp.array(dtype=int)  # 1: no wave can come earlier than the straight one it has
+    certain: wp.array(dtype=int)  # 1: no wave can come earlier than the straight one it has; 2: nor at its neighbours
     first: wp.vec3i  # cell of the box's lower corner
     cells: wp.vec3i  # of the box per axis
     count: int  # of cells
@@ -60,15 +65,18 @@ def cell_of(nodes: Nodes, index: int) -> wp.vec3i:
 
 
 @wp.func
-def node_near(nodes: Nodes, cell: wp.vec3i, neighbour: int, medium: int) -> int:
-    """Flat index of the node of one of the 27 cells around a cell, itself the first; -1 beyond the box."""
-    number = (neighbour + 13) % 27
-    i = cell[0] + number / 9 - 1
-    j = cell[1] + (number / 3) % 3 - 1
-    k = cell[2] + number % 3 - 1
+def node_at(nodes: Nodes, i: int, j: int, k: int, medium: int) -> int:
+    """Flat index of the node of a cell; -1 beyond the box."""
     if i < 0 or j < 0 or k < 0 or i >= nodes.cells[0] or j >= nodes.cells[1] or k >= nodes.cells[2]:
         return -1
     return medium * nodes.count + (i * nodes.cells[1] + j) * nodes.cells[2] + k
+
+
+@wp.func
+def node_near(nodes: Nodes, cell: wp.vec3i, neighbour: int, medium: int) -> int:
+    """Flat index of the node of one of the 27 cells around a cell, itself the first; -1 beyond the box."""
+    number = (neighbour + 13) % 27
+    return node_at(nodes, cell[0] + number / 9 - 1, cell[1] + (number / 3) % 3 - 1, cell[2] + number % 3 - 1, medium)
 
 
 @wp.func
@@ -101,9 +109,9 @@ def place_nodes(passage: Passage, nodes: Nodes):
 
 
 @wp.kernel(enable_backward=False)
-def light_nodes(passage: Passage, nodes: Nodes, medium: int, ignitions: wp.array(dtype=Ignition)):
+def light_nodes(passage: Passage, nodes: Nodes, medium: int, ignitions: wp.array(dtype=Ignition), begin: int):
     """Give the nodes of a medium the straight waves of its detonators."""
-    n = medium * nodes.count + wp.tid()
+    n = medium * nodes.count + begin + wp.tid()
     if nodes.window[n] == OPEN:
         route = straight_route(passage, ignitions, medium, nodes.place[n], NEVER)
         nodes.route[n] = route
@@ -112,9 +120,24 @@ def light_nodes(passage: Passage, nodes: Nodes, medium: int, ignitions: wp.array
 
 
 @wp.kernel(enable_backward=False)
-def settle(nodes: Nodes, open: wp.array(dtype=int), window: int, end: scalar):
+def look_around(nodes: Nodes):
+    """Mark the nodes around which all is in sight."""
+    n = wp.tid()
+    if nodes.certain[n] == 0:
+        return
+    medium = n / nodes.count
+    cell = cell_of(nodes, n - medium * nodes.count)
+    for neighbour in range(1, 27):
+        near = node_near(nodes, cell, neighbour, medium)
+        if near >= 0 and nodes.certain[wp.max(near, 0)] == 0:
+            return
+    nodes.certain[n] = 2
+
+
+@wp.kernel(enable_backward=False)
+def settle(nodes: Nodes, open: wp.array(dtype=int), window: int, end: scalar, begin: int):
     """Settle the nodes whose waves come before the end of a window, and touch their neighbours."""
-    n = open[wp.tid()]
+    n = open[begin + wp.tid()]
     if nodes.window[n] != OPEN or nodes.route[n].time >= end:
         return
     nodes.window[n] = window
@@ -128,9 +151,9 @@ def settle(nodes: Nodes, open: wp.array(dtype=int), window: int, end: scalar):
 
 
 @wp.kernel(enable_backward=False)
-def spread(passage: Passage, nodes: Nodes, open: wp.array(dtype=int), window: int):
+def spread(passage: Passage, nodes: Nodes, open: wp.array(dtype=int), window: int, begin: int):
     """Lead the waves of the nodes settled in a window on to their neighbours."""
-    n = open[wp.tid()]
+    n = open[begin + wp.tid()]
     if nodes.touched[n] != window or nodes.window[n] != OPEN or nodes.certain[n] == 1:
         return
     medium = n / nodes.count
@@ -146,7 +169,7 @@ def spread(passage: Passage, nodes: Nodes, open: wp.array(dtype=int), window: in
                 continue
             known = nodes.route[near]
             if may_come_first(passage, nodes, known, other, place, medium, best):
-                route = onward(passage, known, nodes.place[near], other, place, medium)
+                route = onward(passage, known, nodes.place[near], near, other, place, medium)
                 if route.time < best.time:
                     best = route
     nodes.route[n] = best
@@ -209,11 +232,115 @@ def route_from_nodes(
                 promising = near
         if promise > best.time - SMALL * cell_time or promising < 0:
             break
-        route = onward(passage, nodes.route[promising], nodes.place[promising], medium, place, medium)
+        route = onward(passage, nodes.route[promising], nodes.place[promising], promising, medium, place, medium)
         if route.time < best.time:
             best = route
         last = promise
     return best
+
+
+@wp.kernel(enable_backward=False)
+def spread_fans(passage: Passage, nodes: Nodes, open: wp.array(dtype=int), begin: int):
+    """Pull the ways of the nodes taut to which waves come around something."""
+    n = open[begin + wp.tid()]
+    if nodes.route[n].time < NEVER and nodes.route[n].direct == 0:
+        nodes.fan[n] = taut_fan(passage, nodes.route, nodes.count, n, nodes.place[n])
+
+
+@wp.func
+def blend(
+    passage: Passage,
+    nodes: Nodes,
+    place: vector3,
+    medium: int,
+    time: scalar,
+) -> vector3:
+    """What the eight nodes around a place make of the time of a wave that comes there at about `time`.
+
+    Each node's own time is a little wrong, in its own way: differences between them would be errors of the local speed.
+    So all of them say when they expect the wave, and of those that agree with `time` a mean is taken, with weights that
+    are linear between the nodes.
+
+    Returns:
+        The mean, or `time` where none agrees; and the lowest and highest time of all nodes; NEVER as the highest if not
+        all of them have waves that come around something.
+    """
+    slowness = ONE / passage.speed[medium]
+    agreed = AGREED * nodes.size * slowness
+    offset = wp.cw_div(place, nodes.spacing) - vector3(HALF, HALF, HALF)
+    first = wp.vec3i(int(wp.floor(offset[0])), int(wp.floor(offset[1])), int(wp.floor(offset[2])))
+    offset -= vector3(scalar(first[0]), scalar(first[1]), scalar(first[2]))
+    first -= nodes.first
+    low = NEVER
+    high = -NEVER
+    total = scalar(0.0)
+    excess = scalar(0.0)
+    for corner in range(8):
+        i = corner / 4
+        j = (corner / 2) % 2
+        k = corner % 2
+        near = node_at(nodes, first[0] + i, first[1] + j, first[2] + k, medium)
+        if near < 0:  # behind a face of the domain
+            continue
+        if nodes.fan[near].kind == 0:
+            high = NEVER
+            continue
+        expected = time_over(nodes.fan[near], place, slowness, GOOD * nodes.size * slowness)
+        low = wp.min(low, expected)
+        high = wp.max(high, expected)
+        weight = wp.where(i == 1, offset[0], ONE - offset[0]) * wp.where(j == 1, offset[1], ONE - offset[1])
+        weight *= wp.where(k == 1, offset[2], ONE - offset[2])
+        apart = (expected - time) / agreed
+        weight *= wp.max(ONE - apart * apart, ZERO) ** TWO
+        total += weight
+        excess += weight * (expected - time)
+    mean = time
+    if total > ZERO:
+        mean = time + excess / total
+    return vector3(mean, low, high)
+
+
+@wp.func
+def at_least_straight(
+    nodes: Nodes, ignitions: wp.array(dtype=Ignition), place: vector3, speed: scalar, time: scalar
+) -> scalar:
+    """A time, but not before the straight waves: in one medium none is faster."""
+    least = time
+    if nodes.media == 1:
+        least = wp.max(time, first_arrival(ignitions, place, speed))
+    return least
+
+
+@wp.func
+def wave_at(
+    passage: Passage,
+    nodes: Nodes,
+    ignitions: wp.array(dtype=Ignition),
+    cell: wp.vec3i,
+    place: vector3,
+    medium: int,
+) -> scalar:
+    """When the first wave comes to a place of a medium [s]."""
+    own = node_near(nodes, cell, 0, medium)
+    latest = NEVER
+    if is_present(nodes, own):
+        if nodes.certain[own] == 2:
+            return first_arrival(ignitions, place, passage.speed[medium])
+        latest = nodes.route[own].time + TWO * nodes.size / passage.speed[medium]
+        cell_time = nodes.size / passage.speed[medium]
+        if nodes.fan[own].kind != 0:
+            near = time_over(nodes.fan[own], place, ONE / passage.speed[medium], GOOD * cell_time)
+            found = blend(passage, nodes, place, medium, near)
+            if near < NEVER and found[2] - found[1] < ALL_AGREED * cell_time:
+                return at_least_straight(nodes, ignitions, place, passage.speed[medium], found[0])
+    straight = straight_route(passage, ignitions, medium, place, latest)
+    if straight.direct == 2 and nodes.media == 1:
+        return straight.time
+    best = route_from_nodes(passage, nodes, cell, place, medium, straight)
+    if best.direct > 0 or best.time >= NEVER or nodes.media > 1:
+        return best.time
+    time = blend(passage, nodes, place, medium, best.time)[0]
+    return at_least_straight(nodes, ignitions, place, passage.speed[medium], time)
 
 
 @wp.kernel(enable_backward=False)
@@ -234,14 +361,8 @@ def light_around(
         int(particles.position[p].cell[1]) - nodes.first[1],
         int(particles.position[p].cell[2]) - nodes.first[2],
     )
-    own = node_near(nodes, cell, 0, medium)
-    latest = NEVER
-    if is_present(nodes, own):
-        latest = nodes.route[own].time + TWO * nodes.size / passage.speed[medium]
-    best = straight_route(passage, ignitions, medium, place, latest)
-    if best.direct < 2 or nodes.media > 1:
-        best = route_from_nodes(passage, nodes, cell, place, medium, best)
-    particles.burn_times[p].arrival_time = wp.min(particles.burn_times[p].arrival_time, best.time)
+    time = wave_at(passage, nodes, ignitions, cell, place, medium)
+    particles.burn_times[p].arrival_time = wp.min(particles.burn_times[p].arrival_time, time)
     boost(particles, p, ignitions, place)
 
 

@@ -8,7 +8,7 @@ corner, on the surface of a medium, makes the time stationary: that is Snell's l
 
 import warp as wp
 
-from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, scalar, vector2, vector3
+from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, matrix2, scalar, vector2, vector3
 
 CAUTION = wp.constant(scalar(0.8))  # of the distance to a surface that is stepped over; interpolated ones are inexact
 NEWTON_STEPS = wp.constant(4)
@@ -170,6 +170,69 @@ def tangent(normal: vector3, way: vector3) -> vector3:
     return wp.normalize(along)
 
 
+@wp.struct
+class Bend:
+    """A corner of a way on a medium's surface: derivatives of the time along two unit vectors on the surface."""
+
+    first: vector3
+    second: vector3
+    slope: vector2  # first derivatives [s/m]
+    stiffness: matrix2  # second derivatives [s/m2]
+    scale: scalar  # of these [s/m2]; 0 if there is no corner, or no surface
+
+
+@wp.func
+def bend_of(
+    passage: Passage,
+    surface: int,
+    start: vector3,
+    slowness: scalar,
+    corner: vector3,
+    end: vector3,
+    slowness_after: scalar,
+) -> Bend:
+    """How the time of a way changes with its corner on a medium's surface.
+
+    With the gradient g of the time, its Hessian H and the surface's unit normal n the second derivatives along the
+    surface are those of H - (g . n) grad grad d / |grad d|, d the signed distance.
+    """
+    bend = Bend()
+    before = corner - start
+    after = end - corner
+    length = wp.length(before)
+    length_after = wp.length(after)
+    slope = slope_at(passage, surface, corner)
+    steepness = wp.length(slope)
+    nearest = passage.step * FLAT
+    if length < nearest or length_after < nearest or steepness < HALF * HALF:
+        return bend
+    before /= length
+    after /= length_after
+    gradient = before * slowness - after * slowness_after
+    normal = slope / steepness
+    first = tangent(normal, before + after)
+    second = wp.cross(normal, first)
+    push = wp.dot(gradient, normal) / steepness
+    near = slowness / length
+    far = slowness_after / length_after
+    a = near * (ONE - wp.dot(before, first) ** TWO) + far * (ONE - wp.dot(after, first) ** TWO)
+    b = -near * wp.dot(before, first) * wp.dot(before, second)
+    b -= far * wp.dot(after, first) * wp.dot(after, second)
+    c = near * (ONE - wp.dot(before, second) ** TWO) + far * (ONE - wp.dot(after, second) ** TWO)
+    a -= push * bend_at(passage, surface, corner, first)
+    c -= push * bend_at(passage, surface, corner, second)
+    diagonal = wp.normalize(first + second)
+    opposite = wp.normalize(first - second)
+    turn = bend_at(passage, surface, corner, diagonal) - bend_at(passage, surface, corner, opposite)
+    b -= push * HALF * turn
+    bend.first = first
+    bend.second = second
+    bend.slope = vector2(wp.dot(gradient, first), wp.dot(gradient, second))
+    bend.stiffness = matrix2(a, b, b, c)
+    bend.scale = near + far
+    return bend
+
+
 @wp.func
 def best_corner(
     passage: Passage,
@@ -180,53 +243,18 @@ def best_corner(
     end: vector3,
     slowness_after: scalar,
 ) -> vector3:
-    """The corner, moved along a medium's surface to where the time of the way over it is stationary.
-
-    Newton's method in the tangent plane: with the gradient g of the time, its Hessian H and the surface's unit normal n
-    the second derivatives along the surface are those of H - (g . n) grad grad d / |grad d|, d the signed distance.
-    """
+    """The corner, moved along a medium's surface to where the time of the way over it is stationary (Newton)."""
     for _ in range(CORNER_STEPS):
-        before = corner - start
-        after = end - corner
-        length = wp.length(before)
-        length_after = wp.length(after)
-        if length < passage.step * FLAT or length_after < passage.step * FLAT:
+        bend = bend_of(passage, surface, start, slowness, corner, end, slowness_after)
+        if wp.abs(wp.determinant(bend.stiffness)) <= FLAT * bend.scale * bend.scale:
             break
-        before /= length
-        after /= length_after
-        gradient = before * slowness - after * slowness_after
-        slope = slope_at(passage, surface, corner)
-        steepness = wp.length(slope)
-        if steepness < HALF * HALF:
-            break
-        normal = slope / steepness
-        first = tangent(normal, before + after)
-        second = wp.cross(normal, first)
-        push = wp.dot(gradient, normal) / steepness
-        near = slowness / length
-        far = slowness_after / length_after
-        a = near * (ONE - wp.dot(before, first) ** TWO) + far * (ONE - wp.dot(after, first) ** TWO)
-        b = -near * wp.dot(before, first) * wp.dot(before, second)
-        b -= far * wp.dot(after, first) * wp.dot(after, second)
-        c = near * (ONE - wp.dot(before, second) ** TWO) + far * (ONE - wp.dot(after, second) ** TWO)
-        a -= push * bend_at(passage, surface, corner, first)
-        c -= push * bend_at(passage, surface, corner, second)
-        diagonal = wp.normalize(first + second)
-        opposite = wp.normalize(first - second)
-        turn = bend_at(passage, surface, corner, diagonal) - bend_at(passage, surface, corner, opposite)
-        b -= push * HALF * turn
-        along = wp.dot(gradient, first)
-        across = wp.dot(gradient, second)
-        determinant = a * c - b * b
-        scale = (near + far) * (near + far)
-        if wp.abs(determinant) < FLAT * scale:
-            break
-        move = first * ((b * across - c * along) / determinant) + second * ((b * along - a * across) / determinant)
+        step = -(wp.inverse(bend.stiffness) * bend.slope)
+        move = bend.first * step[0] + bend.second * step[1]
         moved = onto_surface(passage, surface, corner + shortened(move, TWO * TWO * passage.step))
         if slowness != slowness_after:  # a minimum: where Newton's step does not lead down, one that must
-            time = length * slowness + length_after * slowness_after
+            time = wp.length(corner - start) * slowness + wp.length(end - corner) * slowness_after
             if wp.length(moved - start) * slowness + wp.length(end - moved) * slowness_after > time:
-                move = (first * along + second * across) / -(near + far)
+                move = (bend.first * bend.slope[0] + bend.second * bend.slope[1]) / -bend.scale
                 moved = onto_surface(passage, surface, corner + shortened(move, TWO * TWO * passage.step))
         corner = moved
         if wp.length(move) < CLOSE * passage.step:

@@ -22,7 +22,11 @@ vector2 = wp.types.vector(2, scalar)
 vector3 = wp.types.vector(3, scalar)
 vector4 = wp.types.vector(4, scalar)
 vector8 = wp.types.vector(8, scalar)
+matrix2 = wp.types.matrix((2, 2), scalar)
 matrix3 = wp.types.matrix((3, 3), scalar)
+
+single = wp.float32  # of surfaces of triangles, which Warp searches in this precision alone
+single_vector3 = wp.vec3f
 
 ZERO = wp.constant(scalar(0.0))
 QUARTER = wp.constant(scalar(0.25))

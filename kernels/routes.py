@@ -23,7 +23,9 @@ class Route:
     start: vector3  # from which it came to the corner [m]
     start_time: scalar  # [s]
     medium: int  # between start and corner; FIXED: the corner is a detonator, or stays where it is
-    direct: int  # 1: the corner is a detonator
+    direct: int  # 1: the corner is a detonator; 2: and no other one that is hindered would come earlier
+    source: int  # number of that detonator
+    parent: int  # node from which what lies before the corner, or the start, was led on; -1 without one
 
 
 @wp.func
@@ -32,6 +34,7 @@ def no_route() -> Route:
     route = Route()
     route.time = NEVER
     route.medium = FIXED
+    route.parent = -1
     return route
 
 
@@ -43,6 +46,7 @@ def route_from(corner: vector3, corner_time: scalar, speed: scalar, place: vecto
     route.corner_time = corner_time
     route.time = corner_time + wp.length(place - corner) / speed
     route.medium = FIXED
+    route.parent = -1
     return route
 
 
@@ -131,15 +135,21 @@ def across(passage: Passage, known: Route, node: vector3, before: int, place: ve
 
 
 @wp.func
-def onward(passage: Passage, known: Route, node: vector3, before: int, place: vector3, medium: int) -> Route:
+def onward(
+    passage: Passage, known: Route, node: vector3, number: int, before: int, place: vector3, medium: int
+) -> Route:
     """The route of a node in one medium, led on to a place near by in the same or another medium."""
     if medium != before:
-        return across(passage, known, node, before, place, medium)
+        route = across(passage, known, node, before, place, medium)
+        route.parent = number
+        return route
     route = no_route()
     if known.medium != FIXED:
         route = moved_on(passage, known, place, medium)
+        route.parent = known.parent
     if route.time >= NEVER:
         route = around(passage, known, place, medium)
+        route.parent = number
     return route
 
 
@@ -173,6 +183,7 @@ def straight_route(
                 best.corner = source
                 best.corner_time = source_time(ignition, place, speed)
                 best.direct = 1
+                best.source = n
             else:
                 hindered = wp.min(hindered, time)
     if best.direct == 0:

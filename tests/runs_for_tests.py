@@ -27,7 +27,7 @@ def left_by(directory, scene: Scene, *, pictures=(), line=None, history=(), fram
     write_summary(directory / "summary.json", {"status": "complete", **scene_values(scene)})
     nodes = [scene.domain.cells[axis] + 1 for axis in scene.section.in_plane]
     highest = np.max([picture.pressure for picture in pictures], axis=0) if pictures else np.zeros(nodes)
-    section = SectionRecord(highest, np.full(nodes, arrival))
+    section = SectionRecord(highest, np.full(nodes, arrival), np.full(nodes, np.nan))
     time = np.zeros(1) if line is None else line.time
     peaks = np.zeros(len(time), np.float32)
     record = StepRecord(time, peaks, peaks, peaks, None, np.zeros((len(time), 0)), None, line, section)

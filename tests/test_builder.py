@@ -278,7 +278,10 @@ def test_values_are_checked_at_once(call, message):
 
 BUILDS = [
     (lambda b: b.charge(Box((0.05, 0, 0), (0.2, 0.1, 0.1)), INERT), "expected inside the domain, x from 0 to 0.1 m"),
-    (lambda b: b.charge(Sphere((0.05,) * 3, 0.02), INERT), "charges 'cube' and 'charge_2': expected bodies apart"),
+    (
+        lambda b: b.charge(Sphere((0.05,) * 3, 0.02), INERT),
+        "charge 'charge_2': expected room that the charges before it leave free ('cube'), got none",
+    ),
     (lambda b: b.domain(CUBE.lower, CUBE.upper, cell_size=0.3), "expected at least one particle across, x extent 0.1"),
     (
         lambda b: b.domain(CUBE.lower, CUBE.upper, cells=(10, 10, 4)),

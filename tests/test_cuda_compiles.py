@@ -3,7 +3,7 @@
 import pytest
 import warp as wp
 
-from warp_mpm.kernels import eikonal, gauges, grid, material, reduce, shape, sharpen, strain, transfer
+from warp_mpm.kernels import eikonal, gauges, grid, material, reduce, shape, sharpen, strain, surface, transfer
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
@@ -30,6 +30,7 @@ KERNELS = {
     "start_step": lambda: reduce.start_step,
     "record_gauges": lambda: gauges.record_gauges,
     "eikonal": lambda: eikonal.spread,
+    "surface": lambda: surface.signed_distances,
     "initial_strain": lambda: initial_strain_kernel(shape.BSPLINE),
 }
 

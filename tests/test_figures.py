@@ -13,6 +13,7 @@ from runs_for_tests import GAUGES, GPA, first_frame, left_by, run_of
 from scenes_for_tests import OPEN, block
 
 from warp_mpm.config import Save
+from warp_mpm.detonators import CordDetonator, LineDetonator, SphereDetonator
 from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.output.description import scene_values
 from warp_mpm.output.figures import PICTURES, draw_figures
@@ -48,7 +49,8 @@ def record_of(scene: Scene) -> LineRecord:
     points = scene.line.points(60)
     distance = np.linalg.norm(points - points[0], axis=1)
     away = [d.time + np.linalg.norm(points - d.position, axis=1) / 2800.0 for d in scene.detonators]
-    return LineRecord(time, distance, (time[:, None] > np.min(away, axis=0)).astype(np.float32) * np.float32(GPA))
+    expected = np.min(away, axis=0)
+    return LineRecord(time, distance, expected, (time[:, None] > expected).astype(np.float32) * np.float32(GPA))
 
 
 def history_of(count: int = 5) -> list[dict[str, float]]:
@@ -114,6 +116,25 @@ def test_detonators_are_hollow_until_they_are_lit(scene, tmp_path):
     assert lit == [[True, True, True, False, False, False], [True, True, True, True, True, False]]  # 0.5 us apart
 
 
+def test_detonators_that_are_no_points_are_lines(tmp_path):
+    """Dotted, and solid as far as they are lit; what is seen end-on is a dot."""
+    detonators = (
+        CordDetonator(((0.01, 0.01, 0.01), (0.05, 0.01, 0.01)), speed=8000.0, time=1e-6),
+        SphereDetonator((0.03, 0.05, 0.01), 0.01, time=3e-6),
+        LineDetonator((0.05, 0.07, 0.0), (0.05, 0.07, 0.02)),
+    )
+    scene = block((6, 8, 2), detonators=detonators)
+    (axes,) = panels_of(section_figure(left_by(tmp_path, scene, pictures=pictures_of(scene, 6)[2:3])))  # at 3 us
+    solid = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xydata()) > 1]
+    cord, sphere = solid
+    np.testing.assert_allclose(cord, [[10.0, 10.0], [26.0, 10.0]], rtol=1e-6)
+    np.testing.assert_allclose(np.hypot(*(sphere - [30.0, 50.0]).T), 10.0, rtol=1e-6)
+    dotted = [line.get_xydata() for line in axes.lines if line.get_linestyle() == ":"]
+    np.testing.assert_allclose(dotted[0], [[10.0, 10.0], [50.0, 10.0]], rtol=1e-6)
+    (dot,) = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    np.testing.assert_allclose(dot, [[50.0, 70.0]], rtol=1e-6)
+
+
 def test_section_shows_a_free_charge_and_its_gas_only(tmp_path):
     scene = block((6, 8, 2), walls=OPEN, margin_cells=20)
     pressure = np.zeros([scene.domain.cells[axis] + 1 for axis in scene.section.in_plane], dtype=np.float32)
@@ -154,7 +175,7 @@ def test_front_lines_are_the_first_arrival_of_the_delayed_detonators(front):
     along, arrival = line.get_data()
     expected = np.min([0.5 * k + np.abs(along - 80.0 * k) / 2.8 for k in range(6)], axis=0)
     np.testing.assert_allclose(arrival, expected, rtol=1e-9, atol=1e-9)
-    assert line.get_label() == "fronts at D = 2800 m/s"
+    assert line.get_label() == "expected fronts"
     assert axes.get_xlabel() == "distance along the line [mm]"
     assert axes.get_ylabel() == "time [µs]"
     np.testing.assert_allclose(peak.lines[0].get_ydata(), record.pressure.max(axis=0) / GPA)

@@ -106,15 +106,16 @@ def test_arrays_are_copies(ended):
 
 def test_a_line_comes_back(tmp_path):
     time, random = np.linspace(0.0, 1.0, 5), np.random.default_rng(3)
-    lines = [LineRecord(time, np.arange(3.0), random.random((5, 3)).astype(np.float32)) for _ in range(2)]
-    section = SectionRecord(np.ones((2, 3), np.float32), np.full((2, 3), np.nan, np.float32))
+    place, expected = np.arange(3.0), np.array([0.1, 0.2, np.nan])
+    lines = [LineRecord(time, place, expected, random.random((5, 3)).astype(np.float32)) for _ in range(2)]
+    section = SectionRecord(np.ones((2, 3), np.float32), np.full((2, 3), np.nan, np.float32), np.ones((2, 3)))
     record = StepRecord(time, time, time, time, 2 * time, random.random((5, 2)), *lines, section)
     write_steps(tmp_path / "steps.npz", record, ())
     read, pictures = read_steps(tmp_path / "steps.npz")
     assert pictures == ()
     np.testing.assert_array_equal(read.path_pressure, record.path_pressure)
     for name in ("path", "line"):
-        for part in ("time", "distance", "pressure"):
+        for part in ("time", "distance", "expected", "pressure"):
             np.testing.assert_array_equal(getattr(getattr(read, name), part), getattr(getattr(record, name), part))
     assert os.listdir(tmp_path) == ["steps.npz"]
 

@@ -16,6 +16,7 @@ from warp_mpm.scene_loading import list_scenes, load_scene
 from warp_mpm.simulation import simulate
 
 SHIPPED = (
+    "from_mesh",
     "ring_initiation",
     "row_of_charges",
     "six_point",
@@ -25,7 +26,7 @@ SHIPPED = (
     "two_point",
     "wave_shaper",
 )
-ROUND = {"ring_initiation", "row_of_charges", "sphere_in_air", "wave_shaper"}
+ROUND = {"from_mesh", "ring_initiation", "row_of_charges", "sphere_in_air", "wave_shaper"}
 PLATE_SCENES = ("six_point", "two_point")
 COARSE = 2e-2  # [m]
 
@@ -274,6 +275,7 @@ def test_particles_per_axis(name):
         ("wave_shaper", {"cell_size": 5e-3, "end_time": 12e-6}),
         ("sphere_in_air", {"end_time": 10e-6}),
         ("row_of_charges", {"cell_size": 5e-3, "end_time": 10e-6}),
+        ("from_mesh", {}),
     ],
 )
 def test_every_scene_runs(name, parameters):

@@ -1,22 +1,22 @@
 """The figures of a run from records made up for the purpose: a front of known speed, height and place."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scenes_for_tests import explosive, inert_gas
 
 from warp_mpm.builder import SceneBuilder
-from warp_mpm.detonators import PlaneDetonator, PointDetonator
+from warp_mpm.detonators import PointDetonator
 from warp_mpm.geometry import Box
 from warp_mpm.output.frame import GaugeRecord, LineRecord, SectionRecord, StepRecord
-from warp_mpm.scene import Segment
-from warp_mpm.summary import arrival_times, figures_of_merit, ideal_arrival, lit_explosive
+from warp_mpm.summary import arrival_times, figures_of_merit, lit_explosive
 
 SPEED = 2800.0
 DELAY = 2e-6  # [s] of the right detonator
 LENGTH = 0.2  # [m]
-NO_SECTION = SectionRecord(np.zeros((0, 0)), np.zeros((0, 0)))
+NO_SECTION = SectionRecord(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)))
 MET = LENGTH / 2 + SPEED * DELAY / 2  # where the two fronts meet
 
 
@@ -42,8 +42,9 @@ def front_record(scene, speed, lag, height):
 
     def along(segment, count):
         distance = np.linspace(0.0, segment.length, count)
+        expected = np.minimum(distance / SPEED, DELAY + (LENGTH - distance) / SPEED)
         arrival = np.minimum(distance / speed, DELAY + (LENGTH - distance) / speed) + lag / speed
-        return LineRecord(time, distance, height * np.clip((time[:, None] - arrival) / rise, 0.0, 1.0))
+        return LineRecord(time, distance, expected, height * np.clip((time[:, None] - arrival) / rise, 0.0, 1.0))
 
     path, line = along(scene.front_path, 42), along(scene.line, 41)
     return StepRecord(
@@ -90,23 +91,23 @@ def test_figures_of_a_known_front():
 def test_arrivals_are_interpolated_in_time():
     """Half-way between two records if the threshold is half-way between their pressures; never if it is not met."""
     pressure = np.array([[0.0, 5.0, 0.0], [0.0, 5.0, 0.0], [2.0, 5.0, 0.5]])
-    record = LineRecord(np.array([0.0, 1.0, 2.0]), np.arange(3.0), pressure)
+    record = LineRecord(np.array([0.0, 1.0, 2.0]), np.arange(3.0), np.full(3, np.nan), pressure)
     np.testing.assert_allclose(arrival_times(record, 1.0), [1.5, 0.0, math.nan])
 
 
-def test_ideal_arrival():
-    """The delayed minimum over points and planes, as in `test_arrival.py`, for places on the front path."""
+def test_a_path_that_is_no_ray():
+    """Where the front comes aslant, as behind an obstacle, it runs along the path faster than D: its own speed is D."""
     scene = bar()
-    points = Segment((0.0, 0.005, 0.005), (LENGTH, 0.005, 0.005)).points(21)
-    expected = np.minimum(points[:, 0] / SPEED, DELAY + (LENGTH - points[:, 0]) / SPEED)
-    np.testing.assert_allclose(ideal_arrival(scene, points, SPEED), expected, rtol=1e-12, atol=1e-18)
-    plane = SceneBuilder("plane")
-    plane.domain((0.0, 0.0, 0.0), (0.1, 0.1, 0.1), cell_size=0.02)
-    plane.charge(Box((0.0, 0.0, 0.0), (0.1, 0.1, 0.1)), explosive())
-    plane.detonator(PlaneDetonator((0.0, 0.0, 0.0), (0.0, 2.0, 0.0), time=1e-6))
-    plane.end_time(1e-5)
-    arrival = ideal_arrival(plane.build(), np.array([[0.05, 0.07, 0.01]]), SPEED)
-    assert arrival[0] == pytest.approx(1e-6 + 0.07 / SPEED)
+    time, distance = np.linspace(0.0, MET / SPEED, 400), np.linspace(0.0, scene.front_path.length, 42)
+    expected = (0.02 + np.hypot(distance, 0.03)) / SPEED  # from a point beside the path
+    pressure = 2e9 * np.clip((time[:, None] - expected - 1e-6) / (3 * time[1]), 0.0, 1.0)
+    record = front_record(scene, SPEED, 0.0, 2e9)
+    record = replace(record, path=LineRecord(time, distance, expected, pressure))
+    figures = figures_of_merit(scene, record)
+    assert figures["front_speed_m_s"] == pytest.approx(SPEED, rel=0.5 * time[1] * SPEED / MET)
+    assert figures["front_fit_residual_m"] < SPEED * time[1]
+    late = SPEED * (1e-6 + 3 * time[1] * 0.05 * figures["p_cj_pa"] / 2e9)
+    assert figures["front_offset_m"] == pytest.approx(-late, abs=0.5 * SPEED * time[1])
 
 
 def test_what_does_not_apply_is_none():

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from warp_mpm.detonators import CordDetonator
 from warp_mpm.output.description import SceneDescription
 from warp_mpm.output.figures.cells import Cells
-from warp_mpm.output.figures.space import plane_in_box
 from warp_mpm.output.figures.view import View, box_edges, opened, surface_of, view_of
+from warp_mpm.output.isochrones import contour, round_times
+from warp_mpm.output.outlines import lit_part, outlines, plane_in_box
 from warp_mpm.scene import Domain, SectionPlane, Walls
 
 SPACING = np.array([1.0, 0.8, 1.3])
@@ -117,3 +119,39 @@ def test_a_plane_cuts_a_box(point, normal, corners):
     sides = np.linalg.norm(np.roll(polygon, 1, axis=0) - polygon, axis=1)
     if corners:  # in turn around it: all sides equal here, no diagonals
         np.testing.assert_allclose(sides, {4: 1.0, 6: np.sqrt(0.5)}[corners])
+
+
+def test_a_cord_is_lit_as_far_as_it_has_burnt():
+    """At 2 m/s from 1 s on: 3 m after 2.5 s, one of them around the corner."""
+    cord = CordDetonator(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 0.0)), speed=2.0, time=1.0)
+    (outline,) = outlines(cord, np.zeros((2, 3)), np.eye(3))
+    np.testing.assert_array_equal(outline, cord.points)
+    np.testing.assert_allclose(lit_part(cord, outline, 2.5), [[0, 0, 0], [2, 0, 0], [2, 1, 0]])
+    assert len(lit_part(cord, outline, 0.5)) == 0
+    np.testing.assert_array_equal(lit_part(cord, outline, 9.0), outline)
+
+
+def test_lines_of_equal_values():
+    """Closed inside, open where they meet an edge or what has no value; exact on a plane."""
+    rows, columns = np.indices((20, 30)).astype(float)
+    (line,) = contour(rows + 2.0 * columns, 17.5)
+    np.testing.assert_allclose(line @ [1.0, 2.0], 17.5)
+    assert abs(line[0, 0] - line[-1, 0]) > 15.0  # from edge to edge, in turn
+    assert np.abs(np.diff(line, axis=0)).max() <= 1.0
+    away = np.hypot(rows - 9.3, columns - 12.2)
+    (ring,) = contour(away, 6.0)
+    np.testing.assert_array_equal(ring[0], ring[-1])
+    np.testing.assert_allclose(np.hypot(*(ring - [9.3, 12.2]).T), 6.0, atol=2.0 / (8 * 6.0))  # of a chord, the diagonal
+    away[9, 18] = np.nan
+    (torn,) = contour(away, 6.0)
+    assert np.linalg.norm(torn[0] - torn[-1]) > 1.0
+    assert contour(away, 1e3) == []
+
+
+@pytest.mark.parametrize("last", [1.0, 9.99, 12.0, 143e-6])
+def test_times_of_lines_are_round(last):
+    times = round_times(last)
+    assert 4 <= len(times) <= 12
+    assert times[-1] <= last * (1.0 + 1e-9) < times[-1] + 1.001 * times[0]
+    digits = times[0] / 10.0 ** np.floor(np.log10(times[0]) + 1e-9)
+    assert min(abs(digits - step) for step in (1.0, 2.0, 2.5, 5.0, 10.0)) < 1e-6

@@ -5,12 +5,15 @@ import pytest
 from pxr import Gf, Usd, UsdGeom, UsdShade
 from scenes_for_tests import CELL, block
 from usd_checks import ALLOWED, sample_codes
-from usd_frames import FIELDS, FRAMES, LEFT, RANGE, frame_of, open_scene, written
+from usd_frames import FIELDS, FRAMES, LEFT, RANGE, arrival_of, frame_of, open_scene, written
 
 from warp_mpm.errors import SimulationError
 from warp_mpm.output import colormap, usd
 from warp_mpm.output.frame import Frame
 from warp_mpm.output.usd import UsdWriter
+from warp_mpm.places import section_nodes
+
+TIMES = "primvars:arrival_time"
 
 
 @pytest.fixture(scope="module")
@@ -148,13 +151,50 @@ def test_section_faces_are_the_cells_of_the_plane(stage, scene):
 
 def test_detonators_have_place_and_time(stage, scene):
     prims = stage.GetPrimAtPath("/World/detonators").GetChildren()
-    assert [prim.GetName() for prim in prims] == ["detonator_0", "detonator_1"]
+    assert [prim.GetName() for prim in prims] == [f"detonator_{n}" for n in range(5)]
     for prim, detonator in zip(prims, scene.detonators, strict=True):
         place = UsdGeom.Xformable(prim).GetLocalTransformation().ExtractTranslation()
         assert tuple(place) == pytest.approx(detonator.position)
         assert prim.GetAttribute("blast:ignitionTime").Get() == detonator.time
-    assert prims[0].GetTypeName() == "Sphere"
+    assert [prim.GetTypeName() for prim in prims] == ["Sphere"] + 4 * ["BasisCurves"]
     assert prims[1].GetAttribute("blast:normal").Get() == Gf.Vec3f(1.0, 0.0, 0.0)
+
+
+def test_detonators_that_are_no_points_are_curves_where_they_are(stage, scene):
+    def places(number):
+        curves = UsdGeom.BasisCurves(stage.GetPrimAtPath(f"/World/detonators/detonator_{number}"))
+        assert curves.GetTypeAttr().Get() == "linear"
+        counts = np.array(curves.GetCurveVertexCountsAttr().Get())
+        points = np.array(curves.GetPointsAttr().Get()) + scene.detonators[number].position
+        return np.split(points, np.cumsum(counts)[:-1])
+
+    _, plane, cord, sphere, line = scene.detonators
+    (around,) = places(1)
+    np.testing.assert_allclose(around[:, 0], plane.position[0], rtol=1e-6)
+    assert len(around) == 5
+    np.testing.assert_allclose(places(2), [cord.points], atol=1e-8)
+    np.testing.assert_allclose(places(4), [[line.start, line.end]], atol=1e-8)
+    assert len(places(3)) == 3
+    for circle in places(3):
+        np.testing.assert_allclose(np.linalg.norm(circle - sphere.center, axis=1), sphere.radius, rtol=1e-5)
+
+
+def test_isochrones_are_where_the_wave_comes_at_their_times(scene, tmp_path):
+    """On the section; between nodes the times are taken as linear. Where none comes there are none."""
+    path = written(tmp_path / "block.usdc", scene, arrival=arrival_of(scene)).close()
+    stage = Usd.Stage.Open(str(path))
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/World/isochrones"))
+    points, times = np.array(curves.GetPointsAttr().Get()), np.array(attribute(stage, curves.GetPath(), TIMES).Get())
+    corner = section_nodes(scene)[0, 0]
+    np.testing.assert_allclose(points[:, scene.section.axis], corner[scene.section.axis], atol=1e-9)
+    away = np.linalg.norm(points - corner, axis=1)
+    np.testing.assert_allclose(away, 2800.0 * times, atol=0.13 * CELL)  # a chord of a circle: h^2 / 8 R, R = h
+    steps = np.unique(times.round(9))
+    np.testing.assert_allclose(np.diff(steps), steps[0], rtol=1e-4)
+    assert 5 <= len(steps) <= 12
+    middle = np.abs(points - section_nodes(scene)[5:7, 4:6].mean(axis=(0, 1)))[:, list(scene.section.in_plane)]
+    assert not (middle < 0.5 * CELL).all(axis=1).any()
+    assert not Usd.Stage.Open(str(path)).GetPrimAtPath("/World/isochrones").GetAttribute("points").GetTimeSamples()
 
 
 def test_camera_sees_the_whole_charge(stage, scene):

@@ -8,7 +8,7 @@ import usd_checks
 from pxr import Sdf, Usd, UsdGeom
 from scenes_for_tests import CELL
 from usd_checks import assert_sound, faults
-from usd_frames import FRAMES, RANGE, TIMES, frame_of, open_scene, section_of, surface_of, written
+from usd_frames import FRAMES, RANGE, TIMES, arrival_of, frame_of, open_scene, section_of, surface_of, written
 
 from warp_mpm.config import PARTICLE_FIELDS, Layout, Save
 from warp_mpm.errors import InputError, SimulationError
@@ -21,7 +21,13 @@ VARIANTS = {
     "clips": {"layout": Layout.CLIPS},
     "thinned": {"layout": Layout.SINGLE, "particles_every": 5},
     "isosurface": {"layout": Layout.SINGLE, "isosurface": LEVEL},
-    "all in clips": {"layout": Layout.CLIPS, "isosurface": LEVEL, "particles_every": 3},
+    "isochrones": {"layout": Layout.SINGLE, "arrival": arrival_of(open_scene())},
+    "all in clips": {
+        "layout": Layout.CLIPS,
+        "isosurface": LEVEL,
+        "particles_every": 3,
+        "arrival": arrival_of(open_scene()),
+    },
 }
 
 

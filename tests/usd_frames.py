@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 from scenes_for_tests import OPEN, block
 
-from warp_mpm.detonators import PlaneDetonator, PointDetonator
+from warp_mpm.detonators import CordDetonator, LineDetonator, PlaneDetonator, PointDetonator, SphereDetonator
 from warp_mpm.output.frame import Frame, Surface
 from warp_mpm.output.usd import UsdWriter
+from warp_mpm.places import section_nodes
 from warp_mpm.scene import Scene
 
 RANGE = (0.0, 4.0e9)  # [Pa]
@@ -20,10 +21,13 @@ TIMES = [END_TIME * index / (FRAMES - 1) for index in range(FRAMES)]
 
 
 def open_scene() -> Scene:
-    """A plate of 8 x 6 x 2 cells in vacuum, with a delayed point detonator and a plane one."""
+    """A plate of 8 x 6 x 2 cells in vacuum, with a delayed point detonator, a plane, a cord, a sphere and a line."""
     detonators = (
         PointDetonator((0.0, 0.03, 0.01), time=1e-6),
         PlaneDetonator((0.08, 0.0, 0.0), (1.0, 0.0, 0.0), time=2e-6),
+        CordDetonator(((0.01, 0.05, 0.01), (0.03, 0.05, 0.01), (0.04, 0.03, 0.01)), speed=7000.0, time=3e-6),
+        SphereDetonator((0.05, 0.02, 0.01), 0.008, time=4e-6),
+        LineDetonator((0.06, 0.05, 0.0), (0.06, 0.05, 0.02), time=5e-6),
     )
     return block((8, 6, 2), detonators=detonators, walls=OPEN, margin_cells=2, end_time=END_TIME)
 
@@ -33,6 +37,14 @@ def section_of(scene: Scene) -> np.ndarray:
     nodes = [scene.domain.cells[axis] + 1 for axis in scene.section.in_plane]
     i, j = np.indices(nodes)
     return (1e6 * i + 1e3 * j).astype(np.float32)
+
+
+def arrival_of(scene: Scene) -> np.ndarray:
+    """Arrival times [s] that say how far a node is from a corner of the section, and that it is not in its middle."""
+    nodes = section_nodes(scene)
+    times = np.linalg.norm(nodes - nodes[0, 0], axis=-1) / 2800.0
+    times[5:7, 4:6] = np.nan
+    return times
 
 
 def surface_of(index: int) -> Surface:

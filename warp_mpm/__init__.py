@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         row,
     )
     from warp_mpm.errors import InputError, SimulationError, Terminated
-    from warp_mpm.geometry import Box, Cylinder, Sphere
+    from warp_mpm.geometry import Box, Cone, Cylinder, HalfSpace, Mesh, Sphere
     from warp_mpm.kernels.eos.ideal_gas import IdealGas
     from warp_mpm.kernels.eos.jwl import JWL
     from warp_mpm.kernels.eos.mie_gruneisen import MieGruneisen
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from warp_mpm.material_files import load_materials
     from warp_mpm.material_library import air, find_material, library, water
     from warp_mpm.materials import Burn, Material, OnMismatch, ammonium_nitrate, explosive, inert
+    from warp_mpm.mesh_files import load_mesh
     from warp_mpm.run_directory import Run, load
     from warp_mpm.scene import Scene, Wall, Walls
     from warp_mpm.scene_loading import list_scenes, load_scene
@@ -46,13 +47,16 @@ __all__ = [
     "JWL",
     "Box",
     "Burn",
+    "Cone",
     "CordDetonator",
     "Cylinder",
+    "HalfSpace",
     "IdealGas",
     "InputError",
     "Layout",
     "LineDetonator",
     "Material",
+    "Mesh",
     "MieGruneisen",
     "OnMismatch",
     "Order",
@@ -84,6 +88,7 @@ __all__ = [
     "list_scenes",
     "load",
     "load_materials",
+    "load_mesh",
     "load_scene",
     "ring",
     "row",
@@ -105,13 +110,14 @@ _HOMES = {
         "row",
     ),
     "errors": ("InputError", "SimulationError", "Terminated"),
-    "geometry": ("Box", "Cylinder", "Sphere"),
+    "geometry": ("Box", "Cone", "Cylinder", "HalfSpace", "Mesh", "Sphere"),
     "kernels.eos.ideal_gas": ("IdealGas",),
     "kernels.eos.jwl": ("JWL",),
     "kernels.eos.mie_gruneisen": ("MieGruneisen",),
     "kernels.eos.stiffened_gas": ("StiffenedGas",),
     "material_files": ("load_materials",),
     "material_library": ("air", "find_material", "library", "water"),
+    "mesh_files": ("load_mesh",),
     "materials": ("Burn", "Material", "OnMismatch", "ammonium_nitrate", "explosive", "inert"),
     "run_directory": ("Run", "load"),
     "scene": ("Scene", "Wall", "Walls"),

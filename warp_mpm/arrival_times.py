@@ -7,19 +7,22 @@ detonation speed: the union of its charges, as signed distances on a lattice fin
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import warp as wp
 
 from warp_mpm.checks import mistake
-from warp_mpm.geometry import Box, Cylinder, Sphere
 from warp_mpm.ignition import Source, sources_of
 from warp_mpm.kernels import arrival, eikonal
 from warp_mpm.kernels.arrival import Ignition
 from warp_mpm.kernels.passage import Passage
 from warp_mpm.kernels.precision import NEVER, scalar, vector3
-from warp_mpm.kernels.records import Grid, Particles
+from warp_mpm.kernels.records import BurnTimes, Grid, Particles, Position
 from warp_mpm.kernels.routes import Route
+from warp_mpm.kernels.taut import Fan
+from warp_mpm.launch import SMALLEST_SHARED_WORK, Launcher
+from warp_mpm.places import cells_of
 from warp_mpm.scene import Charge, Domain, Scene
 
 LATTICE_PER_CELL = 2  # spacings of the lattice a cell: an obstacle of one cell is seen
@@ -29,6 +32,7 @@ REACH = 0.51  # how far outside its charge a detonator may lie [cells]; half a c
 WINDOW = 0.5  # how far the fastest wave runs while nodes are settled together [cells]
 WINDOWS_AT_ONCE = 8  # between two looks at how far the waves have come
 SAME_SPEED = 1e-6  # relative difference of the speeds of one medium
+PARTS_A_THREAD = 8  # of a launch: some parts have far more to do than others
 CHUNK = 200_000  # lattice points whose distances are computed at a time
 
 
@@ -64,28 +68,78 @@ class Medium:
         return np.min([explosive.charge.solid.signed_distance(points) for explosive in self.explosives], axis=0)
 
 
-def light_particles(scene: Scene, particles: Particles, grid: Grid, device: wp.Device) -> None:
+def light_particles(
+    scene: Scene, particles: Particles, grid: Grid, launcher: Launcher, places: np.ndarray
+) -> np.ndarray:
     """Set the arrival and booster times of particles that are in creation order.
 
     Args:
         scene: the charges and what lights them.
         particles: whose `burn_times` are set; before, they are never.
         grid: the cells.
-        device: where they are.
+        launcher: launches on the device where they are.
+        places: where else the times are wanted (n, 3) [m].
+
+    Returns:
+        When the first wave comes to the places (n,) [s]; NaN where none does, and outside of the explosives.
 
     Raises:
         InputError: no wave comes to an explosive that may not stay unlit.
     """
-    explosives = _explosives(scene)
-    hindered = [one for one in explosives if not _is_open(one, explosives, max(scene.domain.spacing))]
-    for explosive in explosives:
-        straight = explosive.remote if explosive in hindered else explosive.near + explosive.remote
+    waves = _Waves(scene, grid, launcher)
+    times = np.full(len(places), float(NEVER))
+    for explosive in waves.explosives:
+        waves.light(explosive, particles, explosive.begin, len(explosive.charge.positions))
+        slack = TOLERANCE * min(scene.domain.spacing)
+        within = np.flatnonzero(explosive.charge.solid.signed_distance(places) <= slack)
+        if len(within):
+            probes = _probes(scene.domain, places[within], launcher.device)
+            waves.light(explosive, probes, 0, len(within))
+            times[within] = np.minimum(times[within], probes.burn_times.numpy()["arrival_time"])
+    _check_reached(scene, waves.explosives, particles)
+    return np.where(times < float(NEVER), times, np.nan)
+
+
+class _Waves:
+    """What the waves of a scene are computed from: detonators, and nodes' routes where something is in the way."""
+
+    def __init__(self, scene: Scene, grid: Grid, launcher: Launcher) -> None:
+        device = launcher.device
+        self.explosives = _explosives(scene)
+        self._grid, self._launcher = grid, launcher
+        cell = max(scene.domain.spacing)
+        hindered = [one for one in self.explosives if not _is_open(one, self.explosives, cell)]
+        self._media = _media(hindered)
+        self._ignitions = [_array(medium.ignitions, Ignition, device) for medium in self._media]
+        if hindered:
+            self._passage = _passage(scene.domain, self._media, device)
+            self._nodes = _nodes(scene.domain, self._media, device)
+            _settle_nodes(self._passage, self._nodes, self._media, self._ignitions, launcher)
+
+    def light(self, explosive: Explosive, particles: Particles, begin: int, count: int) -> None:
+        """Set the arrival and booster times of `count` particles of an explosive, from `begin` on."""
+        medium = next((n for n, medium in enumerate(self._media) if explosive in medium.explosives), None)
+        straight = explosive.remote if medium is not None else explosive.near + explosive.remote
         if straight:
-            inputs = [particles, grid, _array(straight, Ignition, device), explosive.speed, explosive.begin]
-            wp.launch(arrival.light, len(explosive.charge.positions), inputs=inputs, device=device)
-    if hindered:
-        _light_around(scene, _media(hindered), particles, grid, device)
-    _check_reached(scene, explosives, particles)
+            ignitions = _array(straight, Ignition, self._launcher.device)
+            inputs = [particles, self._grid, ignitions, explosive.speed]
+            _launch(self._launcher, arrival.light, count, inputs, begin)
+        if medium is not None:
+            inputs = [particles, self._grid, self._passage, self._nodes, self._ignitions[medium], medium]
+            _launch(self._launcher, eikonal.light_around, count, inputs, begin)
+
+
+def _probes(domain: Domain, places: np.ndarray, device: wp.Device) -> Particles:
+    """Particles that are nothing but places (n, 3) [m], not yet lit."""
+    position = np.zeros(len(places), dtype=Position.numpy_dtype())
+    position["cell"], position["fraction"] = cells_of(domain, places)
+    times = np.zeros(len(places), dtype=BurnTimes.numpy_dtype())
+    for name in BurnTimes.vars:
+        times[name] = NEVER
+    probes = Particles()
+    probes.position = wp.array(position, dtype=Position, device=device)
+    probes.burn_times = wp.array(times, dtype=BurnTimes, device=device)
+    return probes
 
 
 def _explosives(scene: Scene) -> list[Explosive]:
@@ -116,7 +170,7 @@ def _ignition(domain: Domain, source: Source, booster_radius: float) -> Ignition
 
 def _is_open(explosive: Explosive, explosives: Sequence[Explosive], cell: float) -> bool:
     """Whether nothing can be in the way: it is convex, and no other explosive comes within a cell [m]."""
-    if not isinstance(explosive.charge.solid, Box | Cylinder | Sphere):
+    if not explosive.charge.solid.convex:
         return False
     lower, upper = explosive.charge.solid.bounds()
     others = [one.charge.solid.bounds() for one in explosives if one is not explosive]
@@ -134,23 +188,23 @@ def _media(explosives: Sequence[Explosive]) -> list[Medium]:
     return [Medium(tuple(group)) for group in by_speed]
 
 
-def _light_around(scene: Scene, media: Sequence[Medium], particles: Particles, grid: Grid, device: wp.Device) -> None:
-    """Arrival times where the waves have to go around something or through several explosives."""
-    passage = _passage(scene.domain, media, device)
-    nodes = _nodes(scene.domain, media, device)
-    wp.launch(eikonal.place_nodes, (len(media), nodes.count), inputs=[passage, nodes], device=device)
-    ignitions = [_array(medium.ignitions, Ignition, device) for medium in media]
+def _settle_nodes(
+    passage: Passage,
+    nodes: eikonal.Nodes,
+    media: Sequence[Medium],
+    ignitions: Sequence[wp.array],
+    launcher: Launcher,
+) -> None:
+    """Give all nodes to which waves come their routes, around what is in the way and through several explosives."""
+    wp.launch(eikonal.place_nodes, (len(media), nodes.count), inputs=[passage, nodes], device=launcher.device)
     for number, lit_by in enumerate(ignitions):
-        wp.launch(eikonal.light_nodes, nodes.count, inputs=[passage, nodes, number, lit_by], device=device)
-    _run_waves(passage, nodes, max(medium.speed for medium in media), device)
-    for number, medium in enumerate(media):
-        for explosive in medium.explosives:
-            inputs = [particles, grid, passage, nodes, ignitions[number], number, explosive.begin]
-            wp.launch(eikonal.light_around, len(explosive.charge.positions), inputs=inputs, device=device)
+        _launch(launcher, eikonal.light_nodes, nodes.count, [passage, nodes, number, lit_by])
+    _run_waves(passage, nodes, max(medium.speed for medium in media), launcher)
 
 
-def _run_waves(passage: Passage, nodes: eikonal.Nodes, fastest: float, device: wp.Device) -> None:
+def _run_waves(passage: Passage, nodes: eikonal.Nodes, fastest: float, launcher: Launcher) -> None:
     """Settle all nodes to which a wave comes, in the order of their times."""
+    device = launcher.device
     open_nodes = _array(_open_nodes(nodes), int, device)
     duration = WINDOW * float(nodes.size) / fastest
     window, end = 0, 0.0
@@ -160,13 +214,25 @@ def _run_waves(passage: Passage, nodes: eikonal.Nodes, fastest: float, device: w
         wp.launch(eikonal.find_next, len(open_nodes), inputs=[nodes, open_nodes, following], device=device)
         earliest = float(following.numpy()[0])
         if earliest >= float(NEVER):
-            return
+            break
         end = max(end, earliest)
         for _ in range(WINDOWS_AT_ONCE):
             end += duration
             window += 1
-            wp.launch(eikonal.settle, len(open_nodes), inputs=[nodes, open_nodes, window, end], device=device)
-            wp.launch(eikonal.spread, len(open_nodes), inputs=[passage, nodes, open_nodes, window], device=device)
+            _launch(launcher, eikonal.settle, len(open_nodes), [nodes, open_nodes, window, end])
+            _launch(launcher, eikonal.spread, len(open_nodes), [passage, nodes, open_nodes, window])
+    wp.launch(eikonal.look_around, len(nodes.certain), inputs=[nodes], device=device)
+    _launch(launcher, eikonal.spread_fans, len(open_nodes), [passage, nodes, open_nodes])
+
+
+def _launch(launcher: Launcher, kernel: wp.Kernel, count: int, inputs: Sequence[object], begin: int = 0) -> None:
+    """Launch a kernel that takes the first of its indices last, in parts that the launcher's threads share."""
+    shared = launcher.threads > 1 and count >= SMALLEST_SHARED_WORK
+    parts = launcher.threads * PARTS_A_THREAD if shared else 1
+    cuts = np.linspace(0, count, parts + 1).astype(int)
+    pairs = [(int(low), int(high)) for low, high in pairwise(cuts) if high > low]
+    tasks = [[launcher.record(kernel, high - low, [*inputs, begin + low])] for low, high in pairs]
+    launcher.run(tasks, count)
 
 
 def _open_nodes(nodes: eikonal.Nodes) -> np.ndarray:
@@ -235,6 +301,7 @@ def _nodes(domain: Domain, media: Sequence[Medium], device: wp.Device) -> eikona
     total = nodes.count * nodes.media
     nodes.place = wp.zeros(total, dtype=vector3, device=device)
     nodes.route = wp.zeros(total, dtype=Route, device=device)
+    nodes.fan = wp.zeros(total, dtype=Fan, device=device)
     nodes.window = wp.zeros(total, dtype=int, device=device)
     nodes.touched = wp.zeros(total, dtype=int, device=device)
     nodes.certain = wp.zeros(total, dtype=int, device=device)

@@ -8,7 +8,7 @@ import numpy as np
 
 from warp_mpm import checks
 from warp_mpm.cells import check_aspect, domain_of_cells
-from warp_mpm.charges import Body, charge_warnings, check_fit, cut_charges
+from warp_mpm.charges import Body, charge_warnings, check_fit, cut_charges, fill_what_is_free
 from warp_mpm.checks import mistake
 from warp_mpm.detonators import Detonator, checked
 from warp_mpm.gauges import carried_gauges
@@ -126,7 +126,7 @@ class SceneBuilder:
         may_stay_unlit: bool = False,
         name: str | None = None,
     ) -> None:
-        """Add a body of one material.
+        """Add a body of one material, where no charge added before it is: later ones fill only what is free.
 
         Args:
             solid: its shape.
@@ -138,7 +138,7 @@ class SceneBuilder:
             name: for detonators and messages; without one "charge_1", "charge_2", ...
 
         Raises:
-            InputError: an argument is of the wrong kind, or the name is taken.
+            InputError: an argument is of the wrong kind, the solid is without end, or the name is taken.
         """
         name = f"charge_{len(self._bodies) + 1}" if name is None else name
         here = f"{self._here}: charge {name!r}"
@@ -146,6 +146,10 @@ class SceneBuilder:
         if any(body.name == name for body in self._bodies):
             raise mistake(here, "a name of its own", "one that another charge has")
         checks.instance(f"{here}: solid", solid, Solid, "a Solid, such as Box, Sphere or Cylinder")
+        if not np.isfinite(solid.bounds()).all():
+            raise mistake(
+                f"{here}: solid", "one that has an end", "one without", "intersect it with a box: solid & Box"
+            )
         checks.instance(f"{here}: material", material, Material, "a Material")
         per_axis = checks.count(f"{here}: particles_per_axis", particles_per_axis)
         if velocity is not None and not callable(velocity):
@@ -291,11 +295,12 @@ class SceneBuilder:
             raise mistake(f"{self._here}: charges", "at least one", "none", "add one with charge()")
         check_fit(self._here, self._bodies, domain, self._cell_size)
         check_aspect(self._here, domain)
-        section = self._section if self._section is not None else _mid_plane([body.solid for body in self._bodies])
+        bodies = fill_what_is_free(self._here, self._bodies)
+        section = self._section if self._section is not None else _mid_plane([body.solid for body in bodies])
         self._check_views(domain, end_time, section)
         reach = max(domain.spacing) / 2
-        detonators = resolve_detonators(self._here, self._detonators, self._bodies, reach)
-        charges = cut_charges(self._here, self._bodies, domain)
+        detonators = resolve_detonators(self._here, self._detonators, bodies, reach)
+        charges = cut_charges(self._here, bodies, domain)
         check_resistance(self._here, charges, detonators, 2.0 * reach, end_time)
         pictures = self._picture_times
         if pictures is None:
@@ -320,7 +325,7 @@ class SceneBuilder:
             warnings=tuple(
                 dict.fromkeys(  # what charges of one material have in common is said once
                     warning
-                    for body, charge in zip(self._bodies, charges, strict=True)
+                    for body, charge in zip(bodies, charges, strict=True)
                     for warning in charge_warnings(charge, Lattice(domain, body.particles_per_axis).site_volume)
                 )
             ),

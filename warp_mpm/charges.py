@@ -1,22 +1,24 @@
 """Cuts bodies into charges of particles, after checking that they fit the domain, the cells and the memory."""
 
+import functools
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warp_mpm.checks import mistake
-from warp_mpm.geometry import Solid
+from warp_mpm.errors import InputError
+from warp_mpm.geometry import TOUCHING, Solid, Union, certainly_apart
 from warp_mpm.lattice import Lattice
 from warp_mpm.materials import Material
 from warp_mpm.scene import Charge, Domain, Vector
-from warp_mpm.volume import TARGET_TOLERANCE, measure_volume
+from warp_mpm.volume import TARGET_TOLERANCE, measure_volume, share_nothing
 
 BYTES_PER_PARTICLE = 400  # positions while building, state, sorting and output together, rounded up
 LARGEST_VOLUME_DEVIATION = 0.2  # of a particle's volume from its lattice site's, before a warning
 OUTSIDE_TOLERANCE = 1e-9  # of the domain's size
+OUT_OF_PROPORTION = 100.0  # between a charge and the domain: the unit may be wrong
 
 # An initial velocity: one for all particles, or a function of their positions, (n, 3) [m] to (n, 3) [m/s].
 Velocity = Vector | Callable[[np.ndarray], np.ndarray]
@@ -32,11 +34,32 @@ class Body:
     particles_per_axis: int  # along each axis of every cell
     velocity: Velocity | None = None  # at the start [m/s]; None: at rest
     may_stay_unlit: bool = False  # an explosive to which no detonation needs to come
+    cut_by: tuple[str, ...] = ()  # the earlier bodies that its solid leaves out
 
     @property
     def explosive(self) -> bool:
         """Whether it burns."""
         return self.material.burn is not None
+
+
+def fill_what_is_free(where: str, bodies: Sequence[Body]) -> tuple[Body, ...]:
+    """The bodies, each without what the ones before it take: none overlap any more.
+
+    Bodies that are apart keep their solids as they are, and with them exact distances and volumes.
+
+    Raises:
+        InputError: nothing is left of one.
+    """
+    filled: list[Body] = []
+    for number, body in enumerate(bodies):
+        earlier = [other for other in bodies[:number] if not _are_apart(body.solid, other.solid)]
+        rest = body.solid - functools.reduce(Union, (other.solid for other in earlier)) if earlier else body.solid
+        empty, volume = TOUCHING * _volume_of_bounds(body.solid), rest.exact_volume()
+        body = replace(body, solid=rest, cut_by=tuple(other.name for other in earlier))
+        if earlier and (_volume_of_bounds(rest) <= empty or (volume is not None and volume <= empty)):
+            raise _no_room(f"{where}: charge {body.name!r}", body, "none, all of it lies in them")
+        filled.append(body)
+    return tuple(filled)
 
 
 def check_fit(where: str, bodies: Sequence[Body], domain: Domain, cell_size: np.ndarray) -> None:
@@ -63,7 +86,7 @@ def check_fit(where: str, bodies: Sequence[Body], domain: Domain, cell_size: np.
                     here,
                     f"inside the domain, {letter} from {low:g} to {high:g} m",
                     f"{letter} from {lower[axis]:g} to {upper[axis]:g} m",
-                    "enlarge the domain or move the charge",
+                    "enlarge the domain or move the charge" + _unit_hint(high - low, upper[axis] - lower[axis]),
                 )
             size, extent = particle_size[axis] / body.particles_per_axis, upper[axis] - lower[axis]
             if size > extent * (1.0 + OUTSIDE_TOLERANCE):
@@ -71,7 +94,7 @@ def check_fit(where: str, bodies: Sequence[Body], domain: Domain, cell_size: np.
                     here,
                     f"at least one particle across, {letter} extent {extent:g} m",
                     f"particles of {size:g} m",
-                    "choose a smaller cell size",
+                    "choose a smaller cell size" + _unit_hint(high - low, extent),
                 )
 
 
@@ -79,8 +102,8 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
     """The bodies, cut into particles on the lattices of the domain's cells.
 
     Raises:
-        InputError: one gets no particle, two overlap, a velocity function does not give three finite numbers for each
-            position, or together they need more memory than the machine has.
+        InputError: one gets no particle, a velocity function does not give three finite numbers for each position, or
+            together they need more memory than the machine has.
     """
     volumes = [measure_volume(body.solid) for body in bodies]
     lattices = [Lattice(domain, body.particles_per_axis) for body in bodies]
@@ -90,6 +113,8 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
     for body, (volume, tolerance), lattice in zip(bodies, volumes, lattices, strict=True):
         positions = lattice.sites_in(body.solid)
         here = f"{where}: charge {body.name!r}"
+        if body.cut_by and (len(positions) == 0 or volume <= 0.0):
+            raise _no_room(here, body, "not enough for a single particle")
         if len(positions) == 0:
             raise mistake(here, "at least one particle in it", "none", "choose a smaller cell size")
         velocities = _initial_velocities(f"{here}: velocity", body.velocity, positions)
@@ -100,8 +125,6 @@ def cut_charges(where: str, bodies: Sequence[Body], domain: Domain) -> tuple[Cha
                 *(per_axis, velocities, body.may_stay_unlit),
             )
         )
-    for first, second in combinations(charges, 2):
-        _check_apart(where, first, second)
     return tuple(charges)
 
 
@@ -166,12 +189,24 @@ def _check_memory(where: str, particle_count: float) -> None:
         )
 
 
-def _check_apart(where: str, first: Charge, second: Charge) -> None:
-    """Refuse two charges that overlap."""
-    if first.solid.contains(second.positions).any() or second.solid.contains(first.positions).any():
-        raise mistake(
-            f"{where}: charges {first.name!r} and {second.name!r}",
-            "bodies apart from each other",
-            "bodies that overlap",
-            f"cut one out of the other: {first.name} - {second.name}",
-        )
+def _are_apart(first: Solid, second: Solid) -> bool:
+    """Whether two solids share nothing; those of odd shapes that touch may be taken for overlapping."""
+    return certainly_apart(first, second) or share_nothing(first, second)
+
+
+def _no_room(here: str, body: Body, got: str) -> InputError:
+    """The error of a body that the ones before it leave no room."""
+    names = ", ".join(repr(name) for name in body.cut_by)
+    return mistake(here, f"room that the charges before it leave free ({names})", got, "move it, or add it before them")
+
+
+def _unit_hint(room: float, extent: float) -> str:
+    """What to say of an extent that is out of all proportion to the domain's [m]."""
+    far = max(room, extent) > OUT_OF_PROPORTION * min(room, extent)
+    return ", and check its unit: lengths are in metres, load_mesh(path, unit='mm') reads others" if far else ""
+
+
+def _volume_of_bounds(solid: Solid) -> float:
+    """Volume of the box around a solid [m3]."""
+    lower, upper = solid.bounds()
+    return float(np.prod(upper - lower))

@@ -28,6 +28,7 @@ from warp_mpm.kernels.record import (
     record_step,
 )
 from warp_mpm.output.frame import GaugeRecord, LineRecord, StepRecord
+from warp_mpm.places import Places, cells_of, recorded_places
 from warp_mpm.scene import Domain, Scene, Segment, Vector
 from warp_mpm.section import SectionRecorder
 from warp_mpm.state import NUMBER, State
@@ -48,10 +49,9 @@ class Recorder:
         regions = [nodes_near_point(scene.domain, point, POINT_REACH) for point in scene.collision_points]
         if scene.front_path is not None:
             regions.insert(0, nodes_near_segment(scene.domain, scene.front_path, PATH_REACH))
-        self._path_points = sample_points(scene.domain, scene.front_path)
-        self._line_points = sample_points(scene.domain, scene.line)
-        points = np.concatenate([self._path_points, self._line_points])
-        cell, fraction = _cells_of(scene.domain, points)
+        self._places = recorded_places(scene)
+        points = np.concatenate([self._places.path, self._places.line])
+        cell, fraction = cells_of(scene.domain, points)
         device = state.device
         self._regions = len(regions)
         self._points = len(points)
@@ -77,6 +77,11 @@ class Recorder:
         self._peaks_taken = 0
         self._gauges_taken = 0
         self._sorts_seen = 0
+
+    @property
+    def expected(self) -> Places:
+        """When the detonation comes to where the state is recorded [s]."""
+        return self._state.expected
 
     def record(self) -> None:
         """Record the state as it is now: once before the first step, then after each."""
@@ -142,8 +147,8 @@ class Recorder:
         rows = np.concatenate([rows for _, rows in self._fetched])
         has_path = self._scene.front_path is not None
         first_point = RECORD_HEAD + self._regions
-        on_path = rows[:, first_point : first_point + len(self._path_points)]
-        on_line = rows[:, first_point + len(self._path_points) : self._first_gauge]
+        first_on_line = first_point + len(self._places.path)
+        on_path, on_line = rows[:, first_point:first_on_line], rows[:, first_on_line : self._first_gauge]
         on_gauges = self._gauge_lanes(rows)
         return StepRecord(
             time=time,
@@ -152,8 +157,8 @@ class Recorder:
             field_pressure=rows[:, RECORD_FIELD_PRESSURE],
             path_pressure=rows[:, RECORD_HEAD] if has_path else None,
             point_pressures=rows[:, RECORD_HEAD + int(has_path) : first_point],
-            path=_line_record(time, self._path_points, on_path),
-            line=_line_record(time, self._line_points, on_line),
+            path=_line_record(time, self._places.path, self.expected.path, on_path),
+            line=_line_record(time, self._places.line, self.expected.line, on_line),
             gauges={
                 gauge.name: _gauge_record(time, on_gauges[:, number]) for number, gauge in enumerate(self._scene.gauges)
             },
@@ -190,13 +195,6 @@ class Recorder:
             self._pending = 0
 
 
-def sample_points(domain: Domain, segment: Segment | None) -> np.ndarray:
-    """Points along a segment, (n, 3) [m], about one a cell; none without a segment."""
-    if segment is None:
-        return np.empty((0, 3))
-    return segment.points(max(2, round(segment.length / min(domain.spacing)) + 1))
-
-
 def nodes_near_point(domain: Domain, point: Vector, reach: float) -> np.ndarray:
     """Nodes (n, 3) of the domain within `reach` cells of a point."""
     return nodes_near_segment(domain, Segment(point, point), reach)
@@ -217,13 +215,6 @@ def nodes_near_segment(domain: Domain, segment: Segment, reach: float) -> np.nda
     return nodes[distance <= reach + 1e-9]
 
 
-def _cells_of(domain: Domain, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cell (n, 3) and fraction of the cell (n, 3) of points in the domain."""
-    place = (points - domain.lower) / domain.spacing
-    cell = np.clip(np.floor(place), 0, np.array(domain.cells) - 1)
-    return cell.astype(int), np.clip(place - cell, 0.0, 1.0)
-
-
 def _flat(domain: Domain, nodes: np.ndarray) -> np.ndarray:
     """Flat index of nodes (n, 3), as `kernels.records.node_index` counts."""
     count_y, count_z = domain.cells[1] + 3, domain.cells[2] + 3
@@ -233,7 +224,7 @@ def _flat(domain: Domain, nodes: np.ndarray) -> np.ndarray:
 def _gauge_places(scene: Scene, device: wp.Device) -> GaugePlaces:
     """Where the scene's gauges are, as the kernels take it."""
     points = np.array([gauge.position for gauge in scene.gauges]).reshape(-1, 3)
-    cell, fraction = _cells_of(scene.domain, points)
+    cell, fraction = cells_of(scene.domain, points)
     places = GaugePlaces()
     places.cell = wp.array(cell.astype(np.int32), dtype=wp.vec3i, device=device)
     places.fraction = wp.array(fraction, dtype=vector3, device=device)
@@ -254,7 +245,7 @@ def _gauge_record(time: np.ndarray, lanes: np.ndarray) -> GaugeRecord:
     )
 
 
-def _line_record(time: np.ndarray, points: np.ndarray, pressure: np.ndarray) -> LineRecord | None:
+def _line_record(time: np.ndarray, points: np.ndarray, expected: np.ndarray, pressure: np.ndarray) -> LineRecord | None:
     if len(points) == 0:
         return None
-    return LineRecord(time, np.linalg.norm(points - points[0], axis=1), pressure)
+    return LineRecord(time, np.linalg.norm(points - points[0], axis=1), expected, pressure)

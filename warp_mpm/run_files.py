@@ -50,6 +50,7 @@ def run_files(
                 fields=save.fields,
                 particles_every=save.particles_every,
                 isosurface=save.isosurface,
+                arrival=recorder.expected.section,
                 layout=save.layout,
                 usdz=save.usdz,
                 kept=len(kept),

@@ -45,6 +45,7 @@ class SectionRecorder:
         plane = [corner, strides[first], strides[second], strides[scene.section.axis], share]
         limit = np.inf if threshold is None else threshold
         inputs = [grid, state.clock, *plane, limit, self._last, self._peak, self._arrival]
+        self._expected = state.expected.section
         self._launch = wp.launch(record_section, shape, inputs=inputs, device=state.device, record_cmd=True)
 
     def record(self) -> None:
@@ -72,7 +73,8 @@ class SectionRecorder:
     def result(self) -> SectionRecord:
         """What was kept so far."""
         arrival = self._arrival.numpy()
-        return SectionRecord(self._peak.numpy().copy(), np.where(arrival < NEVER, arrival, NUMBER.type(np.nan)))
+        came = np.where(arrival < NEVER, arrival, NUMBER.type(np.nan))
+        return SectionRecord(self._peak.numpy().copy(), came, self._expected)
 
 
 def _layer(scene: Scene) -> tuple[int, np.floating]:

@@ -132,7 +132,7 @@ class _Run:
             f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}, in {PRECISION} precision; "
             "preparing kernels"
         )
-        self.state = State(self.model)
+        self.state = State(self.model, self.launcher)
         self.solver = Solver(self.model, self.state, self.launcher)
         self.recorder = Recorder(self.state)
         self.audit = Audit(np.array(scene.gravity), scene.mass)

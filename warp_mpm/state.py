@@ -21,7 +21,9 @@ from warp_mpm.kernels.records import (
     Position,
 )
 from warp_mpm.kernels.walls import REACTIONS
+from warp_mpm.launch import Launcher
 from warp_mpm.model import Model
+from warp_mpm.places import recorded_places
 
 GRID_SLOTS = 8  # pieces into which the work on nodes is cut on a CPU
 CACHE_LINE = 64  # [bytes]; a node's eight lanes never lie in two
@@ -47,7 +49,8 @@ RECORD_OF = {field: name for name, record in RECORDS.items() for field in record
 class State:
     """Particles, grid, clock, and what the kernels reduce and tally."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, launcher: Launcher | None = None) -> None:
+        """The start of a scene; a launcher's threads share the work on arrival times."""
         self.model = model
         self.device = model.device
         self.slots = 1 if model.device.is_cuda else GRID_SLOTS
@@ -69,7 +72,11 @@ class State:
         # Twice the count: the sort uses the second half as its scratch.
         self._keys = wp.zeros(2 * self.count, dtype=wp.int64, device=self.device)
         self._order = wp.zeros(2 * self.count, dtype=int, device=self.device)
-        light_particles(model.scene, self.particles, self.grid, self.device)
+        places = recorded_places(model.scene)
+        times = light_particles(
+            model.scene, self.particles, self.grid, launcher or Launcher(self.device, threads=1), places.joined
+        )
+        self.expected = places.parted(times)  # when the detonation comes to where it is recorded [s]
         self.sorts = 0
         self.ranges = self.sort()
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warp_mpm.detonators import Detonator
-from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.exact.reflection import collision_pressure
 from warp_mpm.materials import Material
 from warp_mpm.output.frame import LineRecord, StepRecord
@@ -20,7 +18,10 @@ PLATEAU_PART = (0.5, 0.9)  # of the travel time: when the front pressure is take
 
 @dataclass(frozen=True)
 class FrontSpeed:
-    """Straight-line fit of the front's arrival along the front path."""
+    """Straight-line fit of the front's arrival along the front path over the way of the ideal wave, D t_b.
+
+    On a ray from a detonator that is the distance; elsewhere the front comes to the path around something or aslant.
+    """
 
     speed: float  # [m/s]
     residual: float  # largest distance of an arrival from the line [m]
@@ -62,23 +63,6 @@ def color_limit(scene: Scene) -> float:
     return max(c.material.density * (c.material.specific_energy + 0.5 * c.greatest_speed**2) for c in scene.charges)
 
 
-def ideal_arrival(scene: Scene, points: np.ndarray, speed: float) -> np.ndarray:
-    """Arrival times (n,) [s] of straight waves from the scene's detonators at points (n, 3)."""
-    return straight_arrival(scene.detonators, points, speed)
-
-
-def _lighting(scene: Scene, material: Material) -> list[Detonator]:
-    """The detonators that light charges of a material."""
-    names = {charge.name for charge in scene.charges if charge.material is material}
-    return [detonator for detonator in scene.detonators if names.intersection(detonator.charges)]
-
-
-def _path_arrival(scene: Scene, points: np.ndarray, material: Material) -> np.ndarray:
-    """Ideal arrival times (n,) [s] from the detonators that light charges of a material, at its own speed."""
-    assert material.burn is not None
-    return straight_arrival(_lighting(scene, material), points, material.burn.detonation_speed)
-
-
 def arrival_times(record: LineRecord, threshold: float) -> np.ndarray:
     """When the pressure at each point of a line first reached a threshold [s], interpolated in time; NaN if never."""
     reached = record.pressure >= threshold
@@ -91,23 +75,20 @@ def arrival_times(record: LineRecord, threshold: float) -> np.ndarray:
     return np.where(reached.any(axis=0), times, np.nan)
 
 
-def front_speed(scene: Scene, record: StepRecord, material: Material) -> FrontSpeed | None:
+def front_speed(record: StepRecord, material: Material) -> FrontSpeed | None:
     """Speed of the front along the front path; None if it did not run far enough to tell."""
-    if record.path is None or material.cj is None or not _lighting(scene, material):
+    if record.path is None or material.cj is None or material.burn is None:
         return None
-    distance = record.path.distance
+    distance, expected = record.path.distance, record.path.expected
     arrived = arrival_times(record.path, ARRIVAL_SHARE * material.cj.pressure)
     low, high = (share * distance[-1] for share in FITTED_PART)
-    used = np.isfinite(arrived) & (distance >= low) & (distance <= high)
-    time = arrived[used]
-    if len(time) < 3 or np.ptp(time) == 0.0:
+    used = np.isfinite(arrived) & np.isfinite(expected) & (distance >= low) & (distance <= high)
+    if used.sum() < 3 or np.ptp(arrived[used]) == 0.0:
         return None
-    speed, start = np.polyfit(time, distance[used], 1)
-    residual = float(np.abs(distance[used] - (speed * time + start)).max())
-    assert scene.front_path is not None
-    ideal = _path_arrival(scene, scene.front_path.points(len(distance))[used], material)
-    assert material.burn is not None
-    offset = float(material.burn.detonation_speed * np.mean(ideal - time))
+    time, way = arrived[used], material.burn.detonation_speed * expected[used]
+    speed, start = np.polyfit(time, way, 1)
+    residual = float(np.abs(way - (speed * time + start)).max())
+    offset = float(np.mean(way - material.burn.detonation_speed * time))
     return FrontSpeed(float(speed), residual, offset)
 
 
@@ -151,26 +132,25 @@ def collision_theory(material: Material) -> float:
     return collision_pressure(material.equation_of_state, material.density, material.specific_energy)
 
 
-def front_pressure(scene: Scene, record: StepRecord, material: Material) -> float | None:
+def front_pressure(record: StepRecord) -> float | None:
     """Median over steps of the highest field pressure around the front path, late on its way [Pa]."""
-    if record.path_pressure is None or scene.front_path is None or not _lighting(scene, material):
+    if record.path is None or record.path_pressure is None or not np.isfinite(record.path.expected).any():
         return None
-    ends = np.array([scene.front_path.start, scene.front_path.end])
-    start, end = _path_arrival(scene, ends, material)
-    first, last = (start + share * (end - start) for share in PLATEAU_PART)
+    came = record.path.expected[np.isfinite(record.path.expected)]
+    first, last = (came[0] + share * (came[-1] - came[0]) for share in PLATEAU_PART)
     used = (record.time >= first) & (record.time <= last)
     return float(np.median(record.path_pressure[used])) if used.any() else None
 
 
-def gauge_pressure(scene: Scene, record: StepRecord, material: Material) -> float | None:
+def gauge_pressure(record: StepRecord) -> float | None:
     """What gauges on the front path would show: median over its later part of the highest pressure at a point [Pa].
 
     A node sees the front's peak only at the step when it passes; between nodes the highest nodal value, of which
     `front_pressure` takes the median over steps, is a per cent or two lower.
     """
-    if record.path is None or material.burn is None or scene.front_path is None:
+    if record.path is None or not np.isfinite(record.path.expected).any():
         return None
-    end = _path_arrival(scene, np.array([scene.front_path.end]), material)[0]
+    end = record.path.expected[np.isfinite(record.path.expected)][-1]
     before = record.time <= end
     share = record.path.distance / record.path.distance[-1]
     used = (share >= PLATEAU_PART[0]) & (share <= PLATEAU_PART[1])
@@ -187,7 +167,7 @@ def gauge_figures(scene: Scene, record: StepRecord, material: Material | None) -
     """
     figures: dict[str, dict[str, float | None]] = {}
     for name, gauge in record.gauges.items():
-        line = LineRecord(gauge.time, np.zeros(1), gauge.pressure[:, None])
+        line = LineRecord(gauge.time, np.zeros(1), np.full(1, np.nan), gauge.pressure[:, None])
         threshold = _gauge_threshold(scene, name, gauge.pressure, material)
         arrival = np.nan if threshold is None else float(arrival_times(line, threshold)[0])
         highest = int(np.argmax(gauge.pressure))
@@ -225,12 +205,12 @@ def theory(scene: Scene) -> dict[str, float | None]:
 def figures_of_merit(scene: Scene, record: StepRecord) -> dict[str, object]:
     """The keys of summary.json that compare the run with theory; None where they do not apply."""
     material = lit_explosive(scene)
-    fit = front_speed(scene, record, material) if material is not None else None
+    fit = front_speed(record, material) if material is not None else None
     collisions = [float(value) for value in record.point_pressures.max(axis=0)]
     return {
         **theory(scene),
-        "front_pressure_pa": front_pressure(scene, record, material) if material is not None else None,
-        "front_gauge_pressure_pa": gauge_pressure(scene, record, material) if material is not None else None,
+        "front_pressure_pa": front_pressure(record),
+        "front_gauge_pressure_pa": gauge_pressure(record),
         "front_speed_m_s": fit.speed if fit else None,
         "front_fit_residual_m": fit.residual if fit else None,
         "front_offset_m": fit.offset if fit else None,

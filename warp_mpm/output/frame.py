@@ -53,6 +53,7 @@ class LineRecord:
 
     time: np.ndarray  # (steps,) float64 [s]
     distance: np.ndarray  # (points,) float64 [m] from the line's start
+    expected: np.ndarray  # (points,) [s]: the arrival time there, which the burn follows; NaN where no wave comes
     pressure: np.ndarray  # (steps, points) [Pa]
 
 
@@ -62,6 +63,7 @@ class SectionRecord:
 
     peak: np.ndarray  # (nodes_u, nodes_v) [Pa]: highest field pressure of all steps
     arrival: np.ndarray  # (nodes_u, nodes_v) [s]: when a front came; NaN where none has
+    expected: np.ndarray  # (nodes_u, nodes_v) [s]: the arrival time, which the burn follows; NaN where no wave comes
 
 
 @dataclass(frozen=True)

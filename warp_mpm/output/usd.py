@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
 from pxr import Gf, Sdf, Tf, Vt
 
 from warp_mpm.checks import mistake
@@ -44,6 +45,7 @@ class UsdWriter:
         fields: Sequence[str] = (),
         particles_every: int = 1,
         isosurface: float | None = None,
+        arrival: np.ndarray | None = None,
         layout: Layout = Layout.AUTO,
         usdz: bool = False,
         kept: int = 0,
@@ -58,6 +60,7 @@ class UsdWriter:
             fields: further particle fields, names from `PARTICLE_FIELDS`.
             particles_every: one particle in so many is shown, in creation order.
             isosurface: pressure of the surface to show [Pa]; frames need to have it.
+            arrival: arrival times at the nodes of the section (nodes_u, nodes_v) [s], of which lines are shown.
             layout: whether the frames become one file.
             usdz: also pack the result into `<name>.usdz`.
             kept: the first so many frames of that earlier run stay: it is this run that goes on.
@@ -73,7 +76,7 @@ class UsdWriter:
         self._layout = layout
         self._usdz = usdz
         self._microseconds_per_time_code = 1e6 * scene.end_time / max(frames - 1, 1)
-        self._contents = Contents(scene, pressure_range, tuple(fields), particles_every, isosurface)
+        self._contents = Contents(scene, pressure_range, tuple(fields), particles_every, isosurface, arrival)
         self._sampler = FrameSampler(self._contents)
         self._indices: list[int] = []
         self._result: Path | None = None

@@ -15,8 +15,8 @@ from warp_mpm.output.usd_layout import (
     Contents,
     animated_attributes,
     particle_widths,
-    section_axes,
 )
+from warp_mpm.places import section_nodes
 from warp_mpm.scene import Domain
 
 
@@ -27,7 +27,7 @@ class FrameSampler:
         self.types = animated_attributes(contents)  # value type of each attribute, by path
         self._contents = contents
         self._widths = particle_widths(contents)
-        self._section_shape = tuple(len(axis) for axis in section_axes(contents.scene))
+        self._section_shape = section_nodes(contents.scene).shape[:2]
 
     def samples(self, frame: Frame) -> dict[str, Any]:
         """The value of every animated attribute in a frame, by path.

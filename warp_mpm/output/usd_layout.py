@@ -4,7 +4,8 @@
     /World/particles        Points: points, extent, widths, ids, primvars pressure, displayColor and further fields
     /World/section          Mesh: the field pressure on the scene's section plane
     /World/isosurface       Mesh, if asked for: where the field pressure has a given value; time-sampled topology
-    /World/detonators       one prim each, with position and ignition time
+    /World/detonators       one prim each, with position and ignition time: spheres for points, curves for all else
+    /World/isochrones       BasisCurves on the section plane: where the detonation arrives at the same time
     /World/camera           frames the charge
     /World/materials        a material that glows in displayColor and reflects nothing
 
@@ -19,8 +20,9 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from warp_mpm.detonators import Detonator, PlaneDetonator
 from warp_mpm.output import colormap
+from warp_mpm.output.usd_marks import author_detonators, author_isochrones, charge_box
+from warp_mpm.places import section_nodes
 from warp_mpm.scene import Scene, Wall
 
 WORLD = "/World"
@@ -28,6 +30,7 @@ PARTICLES = "/World/particles"
 SECTION = "/World/section"
 ISOSURFACE = "/World/isosurface"
 DETONATORS = "/World/detonators"
+ISOCHRONES = "/World/isochrones"
 CAMERA = "/World/camera"
 MATERIALS = "/World/materials"
 
@@ -50,6 +53,7 @@ class Contents:
     fields: tuple[str, ...] = ()  # further particle fields, keys of `FIELD_UNITS`
     particles_every: int = 1  # one particle in so many, in creation order
     isosurface: float | None = None  # pressure [Pa]
+    arrival: np.ndarray | None = None  # times at the nodes of the section (nodes_u, nodes_v) [s]; NaN if never
 
 
 def animated_attributes(contents: Contents) -> dict[str, Any]:
@@ -114,7 +118,9 @@ def author_static(layer: Any, contents: Contents) -> None:
     _author_section(stage, scene, material)
     if contents.isosurface is not None:
         _author_isosurface(stage, contents.isosurface, contents.pressure_range)
-    _author_detonators(stage, scene, material)
+    author_detonators(stage, DETONATORS, scene, material)
+    if contents.arrival is not None and np.isfinite(contents.arrival).any():
+        author_isochrones(stage, ISOCHRONES, scene, contents.arrival, material)
     _author_camera(stage, scene)
 
 
@@ -126,13 +132,6 @@ def particle_widths(contents: Contents) -> np.ndarray:
     volumes = [np.full(len(charge.positions), charge.particle_volume) for charge in contents.scene.charges]
     shown = np.concatenate(volumes)[:: contents.particles_every]
     return np.cbrt(contents.particles_every * shown).astype(np.float32)
-
-
-def section_axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates of the domain's nodes along the two axes of the section plane [m]: (nodes_u,), (nodes_v,) float64."""
-    domain = scene.domain
-    u, v = (np.linspace(domain.lower[a], domain.upper[a], domain.cells[a] + 1) for a in scene.section.in_plane)
-    return u, v
 
 
 def _author_particles(stage: Any, contents: Contents, material: Any) -> None:
@@ -152,12 +151,10 @@ def _author_particles(stage: Any, contents: Contents, material: Any) -> None:
 
 def _author_section(stage: Any, scene: Scene, material: Any) -> None:
     """The nodes in the section plane and the quadrilaterals between them; node (i, j) is point i nodes_v + j."""
-    u, v = section_axes(scene)
-    plane = np.full((len(u), len(v), 3), scene.section.coordinate)
-    first, second = scene.section.in_plane
-    plane[..., first], plane[..., second] = u[:, None], v[None, :]
-    corner = (np.arange(len(u) - 1)[:, None] * len(v) + np.arange(len(v) - 1)).ravel()
-    quads = np.stack([corner, corner + len(v), corner + len(v) + 1, corner + 1], axis=1)
+    plane = section_nodes(scene)
+    rows, columns = plane.shape[:2]
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    quads = np.stack([corner, corner + columns, corner + columns + 1, corner + 1], axis=1)
 
     mesh = UsdGeom.Mesh.Define(stage, SECTION)
     points = Vt.Vec3fArray.FromNumpy(plane.reshape(-1, 3).astype(np.float32))
@@ -165,7 +162,7 @@ def _author_section(stage: Any, scene: Scene, material: Any) -> None:
     mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(quads), 4, dtype=np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(quads.ravel().astype(np.int32)))
-    normal = np.cross(*np.eye(3, dtype=np.float32)[[first, second]])
+    normal = np.cross(*np.eye(3, dtype=np.float32)[list(scene.section.in_plane)])
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.tile(normal, (len(points), 1))))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
@@ -204,33 +201,6 @@ def _declare_pressure(shape: Any) -> None:
     color.CreateIndicesAttr()
 
 
-def _author_detonators(stage: Any, scene: Scene, material: Any) -> None:
-    UsdGeom.Scope.Define(stage, DETONATORS)
-    lower, upper = _charge_box(scene)
-    radius = 0.025 * float(np.linalg.norm(upper - lower))  # large enough to show through the side of a thin plate
-    for number, detonator in enumerate(scene.detonators):
-        prim = _author_detonator(stage, f"{DETONATORS}/detonator_{number}", detonator, radius)
-        UsdGeom.XformCommonAPI(prim).SetTranslate(Gf.Vec3d(*detonator.position))
-        if prim.IsA(UsdGeom.Gprim):
-            UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
-        time = prim.CreateAttribute("blast:ignitionTime", Sdf.ValueTypeNames.Double)
-        time.Set(detonator.time)
-        time.SetDocumentation("ignition [s]")
-
-
-def _author_detonator(stage: Any, path: str, detonator: Detonator, radius: float) -> Any:
-    """A point detonator is a small sphere, a plane one an Xform that knows its normal."""
-    if isinstance(detonator, PlaneDetonator):
-        prim = UsdGeom.Xform.Define(stage, path).GetPrim()
-        prim.CreateAttribute("blast:normal", Sdf.ValueTypeNames.Vector3f).Set(Gf.Vec3f(*detonator.normal))
-        return prim
-    sphere = UsdGeom.Sphere.Define(stage, path)
-    sphere.CreateRadiusAttr(radius)
-    sphere.CreateExtentAttr([Gf.Vec3f(-radius), Gf.Vec3f(radius)])
-    sphere.CreateDisplayColorAttr([Gf.Vec3f(0.0, 0.6, 1.0)])  # a blue that the colour map does not have
-    return sphere.GetPrim()
-
-
 def _author_material(stage: Any) -> Any:
     """A surface that only glows, in the colours of displayColor: light and shadow would falsify them."""
     UsdGeom.Scope.Define(stage, MATERIALS)
@@ -250,7 +220,7 @@ def _author_material(stage: Any) -> Any:
 
 def _author_camera(stage: Any, scene: Scene) -> None:
     """A camera that sees the whole charge, along the section plane's normal but a little round the corner."""
-    lower, upper = _charge_box(scene)
+    lower, upper = charge_box(scene)
     centre = 0.5 * (lower + upper)
     axes = _camera_axes(scene, turn=math.radians(25.0), lift=math.radians(12.0))
     signs = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1))).reshape(3, -1).T
@@ -279,13 +249,6 @@ def _camera_axes(scene: Scene, turn: float, lift: float) -> np.ndarray:
     sideways = np.cross(up, backward)
     sideways /= np.linalg.norm(sideways)
     return np.stack([sideways, np.cross(backward, sideways), backward])
-
-
-def _charge_box(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corner of the box around all particles [m], (3,) float64 each."""
-    lower = np.min([charge.positions.min(axis=0) for charge in scene.charges], axis=0)
-    upper = np.max([charge.positions.max(axis=0) for charge in scene.charges], axis=0)
-    return lower, upper
 
 
 def _field_type(name: str) -> Any:

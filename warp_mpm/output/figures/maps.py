@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.ticker import MaxNLocator
 
-from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.output import colormap
 from warp_mpm.output.description import SceneDescription
 from warp_mpm.output.figures.content import (
@@ -84,19 +83,15 @@ def arrival_figure(run: Run) -> Figure:
     if not came.any():
         raise NothingToDrawError("no front came to the section")
     arrival, last = np.where(came, arrival, np.nan), float(arrival[came].max())
-    expected = _expected(run)
-    expected = None if expected is None else np.where(came, expected, np.nan)
+    expected = np.where(came, step_record(run).section.expected / MICROSECOND, np.nan)
     if is_thin(setup):
         return _profile(run, arrival, "arrival of the front [µs]", expected)
     figure, axes = _map(run, came)
     image = _draw_values(axes, run, arrival, cmap=_arrival_colors(), vmin=0.0, vmax=last)
     levels = MaxNLocator(ISOCHRONES, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, last)[1:]
-    if expected is not None:
-        style = {"colors": "white", "linewidths": 1.8}
-        _draw_lines(axes, setup, expected, levels, **style)
-        axes.plot(
-            [], [], color="0.8", linewidth=1.8, label=f"at D = {run.summary['detonation_speed_m_s']:.0f} m/s (white)"
-        )
+    if np.isfinite(expected).any():
+        _draw_lines(axes, setup, expected, levels, colors="white", linewidths=1.8)
+        axes.plot([], [], color="0.8", linewidth=1.8, label="expected (white)")
     lines = _draw_lines(axes, setup, arrival, levels, colors="black", linewidths=0.8)
     axes.plot([], [], color="black", linewidth=0.8, label="computed")
     axes.clabel(lines, fontsize=7.0, fmt="%g")
@@ -118,18 +113,6 @@ def _in_charges(run: Run) -> np.ndarray:
 def _arrival_colors() -> ListedColormap:
     """Viridis without its darkest part, on which black lines would not show."""
     return ListedColormap(colormaps["viridis"](np.linspace(0.3, 1.0, 256)))
-
-
-def _expected(run: Run) -> np.ndarray | None:
-    """When straight waves come to the nodes (nodes_u, nodes_v) [us]; None without an explosive."""
-    setup, speed = setup_of(run), run.summary.get("detonation_speed_m_s")
-    if speed is None or not setup.detonators:
-        return None
-    u, v = (node_places(setup.domain, axis) * MILLIMETRE for axis in setup.section.in_plane)
-    points = np.full((len(u), len(v), 3), setup.section.coordinate)
-    points[..., setup.section.in_plane[0]], points[..., setup.section.in_plane[1]] = u[:, None], v
-    arrival = straight_arrival(setup.detonators, points.reshape(-1, 3), speed)
-    return arrival.reshape(len(u), len(v)) / MICROSECOND
 
 
 def _map(run: Run, seen: np.ndarray) -> tuple[Figure, Axes]:

@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
 from matplotlib.ticker import MaxNLocator
 
-from warp_mpm.detonators import Detonator, PlaneDetonator
+from warp_mpm.detonators import PlaneDetonator
 from warp_mpm.output.description import SceneDescription
 from warp_mpm.output.figures.cells import charge_cells
 from warp_mpm.output.figures.content import charge_box, setup_of
+from warp_mpm.output.figures.marks import draw_mark
 from warp_mpm.output.figures.style import AXIS_NAMES, MARK, MILLIMETRE
 from warp_mpm.run_directory import Run
 from warp_mpm.scene import Domain
@@ -71,22 +72,28 @@ def label_axes(panels: np.ndarray, setup: SceneDescription) -> None:
 
 
 def draw_detonators(axes: Axes, setup: SceneDescription, time: float = math.inf) -> None:
-    """Draw the detonators in the window of the axes: filled once they are lit, hollow before."""
+    """Draw the detonators in the window of the axes as seen along the section's normal, as far as they are lit.
+
+    A plane is drawn where it cuts the section.
+    """
+    in_plane, axis = list(setup.section.in_plane), setup.section.axis
+    box = np.array([setup.domain.lower, setup.domain.upper])
     for detonator in setup.detonators:
-        _draw_detonator(axes, detonator, setup.section.in_plane, MARK if detonator.time <= time else "none")
+        if isinstance(detonator, PlaneDetonator):
+            _draw_cut(axes, detonator, setup, time)
+        else:
+            draw_mark(axes, detonator, lambda points: points[..., in_plane], np.eye(3)[axis], box, time)
 
 
-def _draw_detonator(axes: Axes, detonator: Detonator, in_plane: tuple[int, int], face: str) -> None:
-    first, second = in_plane
-    at = (detonator.position[first] / MILLIMETRE, detonator.position[second] / MILLIMETRE)
-    if isinstance(detonator, PlaneDetonator):
-        along = (-detonator.normal[second], detonator.normal[first])
-        if along != (0.0, 0.0):
-            axes.axline(at, (at[0] + along[0], at[1] + along[1]), color=MARK, linewidth=1.0)
-        return
-    if not all(low <= x <= high for x, (low, high) in zip(at, (axes.get_xlim(), axes.get_ylim()), strict=True)):
-        return
-    axes.plot(*at, "o", markersize=4.0, color=MARK, markerfacecolor=face, markeredgewidth=1.0, clip_on=False, zorder=5)
+def _draw_cut(axes: Axes, plane: PlaneDetonator, setup: SceneDescription, time: float) -> None:
+    """The line in which a plane cuts the section."""
+    in_plane, axis = list(setup.section.in_plane), setup.section.axis
+    normal, point = np.array(plane.normal), np.array(plane.position)
+    across = normal[in_plane]
+    if across.any():
+        point = point[in_plane] - across * normal[axis] * (setup.section.coordinate - point[axis]) / (across @ across)
+        at, style = point / MILLIMETRE, "-" if plane.time <= time else ":"
+        axes.axline(at, at + np.array([-across[1], across[0]]), color=MARK, linewidth=1.4, linestyle=style)
 
 
 def draw_outlines(panels: Iterable[Axes], run: Run, color: str = "white") -> None:

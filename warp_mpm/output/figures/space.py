@@ -8,11 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
-from warp_mpm.detonators import PlaneDetonator
 from warp_mpm.output.description import SceneDescription
 from warp_mpm.output.figures.content import charge_box, setup_of
-from warp_mpm.output.figures.style import AXIS_NAMES, MARK, MILLIMETRE
-from warp_mpm.output.figures.view import CORNERS, View
+from warp_mpm.output.figures.marks import draw_mark
+from warp_mpm.output.figures.style import AXIS_NAMES, MILLIMETRE
+from warp_mpm.output.figures.view import View
+from warp_mpm.output.outlines import CORNERS
 from warp_mpm.run_directory import Run
 
 THICK = 0.25  # of the longest extent
@@ -39,18 +40,9 @@ def draw_edges(axes: Axes, view: View, edges: np.ndarray, **style: Any) -> None:
 
 
 def draw_detonators(axes: Axes, view: View, setup: SceneDescription, box: np.ndarray, time: float) -> None:
-    """Mark the detonators, through whatever is before them: filled once lit. `box` (2, 3) bounds planes [m]."""
+    """Mark the detonators, through whatever is before them, as far as they are lit. `box` (2, 3) bounds planes [m]."""
     for detonator in setup.detonators:
-        lit = detonator.time <= time
-        if isinstance(detonator, PlaneDetonator):
-            outline = plane_in_box(np.array(detonator.position), np.array(detonator.normal), box)
-            if len(outline):
-                at = view.project(np.vstack([outline, outline[:1]])) / MILLIMETRE
-                axes.plot(*at.T, color=MARK, linewidth=1.0, linestyle="-" if lit else ":")
-            continue
-        at = view.project(np.array(detonator.position)) / MILLIMETRE
-        face = MARK if lit else "none"
-        axes.plot(*at, "o", markersize=4.0, color=MARK, markerfacecolor=face, markeredgewidth=1.0, zorder=5)
+        draw_mark(axes, detonator, view.project, view.axes[2], box, time)
 
 
 def window_of(view: View, points: np.ndarray, margin: float = 0.04) -> tuple[float, float, float, float]:
@@ -95,22 +87,3 @@ def _round_below(length: float) -> float:
     """The longest of 1, 2, 5, 10, 20, ... that is not above a length."""
     power = 10.0 ** math.floor(math.log10(length))
     return max(step * power for step in ROUND if step * power <= length)
-
-
-def plane_in_box(point: np.ndarray, normal: np.ndarray, box: np.ndarray) -> np.ndarray:
-    """The polygon (n, 3) in which a plane cuts a box (2, 3); empty if it does not."""
-    lower, upper = box
-    cuts = []
-    for axis in range(3):
-        for start in corners_of(lower, upper)[CORNERS[:, axis] == 0]:
-            end = start.copy()
-            end[axis] = upper[axis]
-            from_plane = normal @ (start - point), normal @ (end - point)
-            if from_plane[0] * from_plane[1] <= 0.0 and from_plane[0] != from_plane[1]:
-                cuts.append(start + from_plane[0] / (from_plane[0] - from_plane[1]) * (end - start))
-    if len(cuts) < 3:
-        return np.empty((0, 3))
-    around = np.array(cuts) - np.mean(cuts, axis=0)
-    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    angle = np.arctan2(around @ np.cross(normal, first) / np.linalg.norm(normal), around @ first)
-    return np.array(cuts)[np.argsort(angle)]

@@ -11,11 +11,11 @@ import numpy as np
 
 from warp_mpm.output.description import SceneDescription
 from warp_mpm.output.figures.cells import Cells
+from warp_mpm.output.outlines import CORNERS
 from warp_mpm.scene import SectionPlane
 
 FLAT = (math.radians(25.0), math.radians(12.0))  # turn and lift of the view from the section's normal: the USD camera's
 ROUND = (math.radians(38.0), math.radians(22.0))  # of the view of thick bodies
-CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])  # of a box, in its edges
 
 
 @dataclass(frozen=True)

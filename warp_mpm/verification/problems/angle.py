@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.detonators import PlaneDetonator
 from warp_mpm.exact.taylor_wave import PlanarTaylorWave
-from warp_mpm.geometry import Bounds, Solid
+from warp_mpm.geometry import Box, Solid
 from warp_mpm.materials import ammonium_nitrate
 from warp_mpm.scene import Scene, Wall, Walls
 from warp_mpm.simulation import Result
@@ -57,11 +56,12 @@ class Angle(Problem):
     def scene(self, level: Level) -> Scene:
         """The domain is the box around the slab, with a little room; gas that flies off it leaves."""
         run = WIDTHS_RUN * level.cells
-        slab = TiltedSlab(front_end(run) * CELL, level.cells * CELL, CELL, math.radians(level.settings["angle"]))
+        angle = math.radians(level.settings["angle"])
+        slab = tilted_slab(front_end(run) * CELL, level.cells * CELL, CELL, angle)
         lower, upper = slab.bounds()
         below = [-ROOM + math.floor(x / CELL + 1e-9) for x in lower[:2]]
         above = [ROOM + math.ceil(x / CELL - 1e-9) for x in upper[:2]]
-        direction = np.array([math.cos(slab.angle), math.sin(slab.angle), 0.0])
+        direction = np.array([math.cos(angle), math.sin(angle), 0.0])
         middle = np.array([0.0, 0.0, CELL / 2])
         builder = SceneBuilder(self.name)
         builder.domain(
@@ -93,40 +93,9 @@ class Angle(Problem):
         return {"front_spread": max(fronts) / min(fronts) - 1.0}
 
 
-@dataclass(frozen=True)
-class TiltedSlab(Solid):
-    """A slab on the plane z = 0 whose rear face is centred on the z axis, turned about that axis."""
-
-    length: float  # from the rear face on [m]
-    width: float  # [m]
-    thickness: float  # along z [m]
-    angle: float  # between its length and the x axis [radians]
-
-    def bounds(self) -> Bounds:
-        """The box around its corners."""
-        along = np.array([0.0, self.length, 0.0, self.length])
-        across = self.width / 2 * np.array([-1.0, -1.0, 1.0, 1.0])
-        cosine, sine = math.cos(self.angle), math.sin(self.angle)
-        x, y = along * cosine - across * sine, along * sine + across * cosine
-        return np.array([x.min(), y.min(), 0.0]), np.array([x.max(), y.max(), self.thickness])
-
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        """Which points lie inside."""
-        return self.signed_distance(points) < 0.0
-
-    def signed_distance(self, points: np.ndarray) -> np.ndarray:
-        """Exact distance to the surface."""
-        x, y, z = points.T
-        cosine, sine = math.cos(self.angle), math.sin(self.angle)
-        half = np.array([self.length, self.width, self.thickness]) / 2
-        along, across = x * cosine + y * sine - half[0], y * cosine - x * sine
-        excess = np.abs(np.stack([along, across, z - half[2]], axis=1)) - half
-        outside = np.linalg.norm(np.maximum(excess, 0.0), axis=1)
-        return outside + np.minimum(excess.max(axis=1), 0.0)
-
-    def exact_volume(self) -> float:
-        """Product of the edges."""
-        return self.length * self.width * self.thickness
+def tilted_slab(length: float, width: float, thickness: float, angle: float) -> Solid:
+    """A slab on the plane z = 0 whose rear face is centred on the z axis, turned about that axis [m, radians]."""
+    return Box((0.0, -width / 2, 0.0), (length, width / 2, thickness)).rotated((0.0, 0.0, 1.0), angle)
 
 
 PROBLEMS = (Angle(),)

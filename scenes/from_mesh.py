@@ -1,0 +1,76 @@
+"""A charge from a mesh: a ring from an STL file, lit at one side; or any file of yours."""
+
+import math
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import meshio
+import numpy as np
+
+from warp_mpm.builder import SceneBuilder
+from warp_mpm.checks import not_negative
+from warp_mpm.detonators import PointDetonator
+from warp_mpm.geometry import Mesh
+from warp_mpm.materials import ammonium_nitrate
+from warp_mpm.mesh_files import load_mesh
+from warp_mpm.scene import Scene, Wall, Walls
+
+RING, TUBE = 60.0, 20.0  # radii of the ring and of its tube [mm]
+AROUND, ACROSS = 96, 32  # vertices
+PICTURES = 6
+
+
+def scene(
+    *,
+    mesh: str = "",
+    unit: str = "mm",
+    cell_size: float = 4e-3,
+    room: float = 0.02,
+    particles_per_axis: int = 2,
+    end_time: float = 75e-6,
+) -> Scene:
+    """The paper's explosive in the shape of a closed surface, free in a vacuum, lit where its x is least.
+
+    Args:
+        mesh: an STL, OBJ, PLY or Gmsh file; without one the ring that `write_ring` makes.
+        unit: of its coordinates.
+        cell_size: wanted [m].
+        room: around it [m].
+        particles_per_axis: particles along each axis of every cell.
+        end_time: [s].
+    """
+    solid = load_mesh(mesh, unit=unit) if mesh else _ring(unit)
+    explosive = ammonium_nitrate()
+    lower, upper = solid.bounds()
+    first, last = (solid.vertices[index(solid.vertices[:, 0])] for index in (np.argmin, np.argmax))
+
+    builder = SceneBuilder("from_mesh")
+    builder.domain(lower, upper, cell_size=cell_size, margins=not_negative("room", room))
+    builder.walls(Walls.all(Wall.OPEN))
+    builder.charge(solid, explosive, particles_per_axis=particles_per_axis, name="body")
+    builder.detonator(PointDetonator(tuple(first)))
+    builder.line(first, last)
+    builder.section(2, float(first[2]))
+    builder.gauge(last, name="opposite", moving=True)
+    builder.end_time(end_time)
+    builder.picture_times(end_time * part / PICTURES for part in range(1, PICTURES + 1))
+    return builder.build()
+
+
+def write_ring(path: str | Path) -> None:
+    """Write a ring about the z axis, in millimetres, to an STL file."""
+    long, short = np.meshgrid(*(2.0 * math.pi * np.arange(n) / n for n in (AROUND, ACROSS)), indexing="ij")
+    reach = RING + TUBE * np.cos(short)
+    points = np.stack([reach * np.cos(long), reach * np.sin(long), TUBE * np.sin(short)], axis=-1).reshape(-1, 3)
+    a = np.arange(AROUND * ACROSS).reshape(AROUND, ACROSS)
+    b, d = np.roll(a, -1, axis=0), np.roll(a, -1, axis=1)
+    c = np.roll(b, -1, axis=1)
+    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    meshio.write(path, meshio.Mesh(points, {"triangle": faces}), file_format="stl", binary=True)
+
+
+def _ring(unit: str) -> Mesh:
+    with TemporaryDirectory() as directory:
+        path = Path(directory) / "ring.stl"
+        write_ring(path)
+        return load_mesh(path, unit=unit)

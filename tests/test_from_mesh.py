@@ -1,0 +1,41 @@
+"""The scene that detonates a mesh: exact mass, arrival times around the hole of a ring, and any other file."""
+
+import numpy as np
+import pytest
+
+from warp_mpm.config import Save
+from warp_mpm.detonators import PointDetonator
+from warp_mpm.errors import InputError
+from warp_mpm.exact.kenamond import inert_sphere
+from warp_mpm.scene_loading import load_scene
+from warp_mpm.scenes.from_mesh import write_ring
+from warp_mpm.simulation import simulate
+
+
+def test_from_mesh():
+    """Mass of a regular polygon's way around an axis in n steps, n sin(2 pi/n) R A; waves that go round the hole."""
+    scene = load_scene("from_mesh", cell_size=8e-3)
+    (body,) = scene.charges
+    area = 32 / 2 * 0.02**2 * np.sin(2 * np.pi / 32)
+    volume = 96 * np.sin(2 * np.pi / 96) * 0.06 * area
+    assert body.volume == pytest.approx(volume, rel=1e-6)  # an STL file is in single precision
+    assert body.mass == pytest.approx(1000.0 * body.solid.exact_volume(), rel=1e-14)
+    assert body.volume_tolerance == 0.0
+    result = simulate(scene, save=Save(frames=2, figures=False))
+    lamp = PointDetonator((-0.08, 0.0, 0.0))
+    assert scene.detonators[0].position == pytest.approx(lamp.position, abs=1e-6)
+    middle = np.abs(body.positions[:, 2]) < 4e-3  # the next layers have to go over the hole's curved side
+    exact = inert_sphere(body.positions, radius=0.04, detonator=lamp, speed=2800.0, cylinder=True)
+    times = result.state.field("arrival_time").astype(np.float64)
+    assert np.abs(times - exact)[middle].max() * 2800.0 / 8e-3 < 0.1
+    gauge = result.record.gauges["opposite"]
+    around = 2 * np.sqrt(0.08**2 - 0.04**2) + 0.04 * np.pi / 3  # along two tangents and a sixth of the hole's rim
+    assert gauge.time[np.argmax(gauge.pressure > 0.1e9)] == pytest.approx(around / 2800.0, abs=8e-3 / 2800.0)
+
+
+def test_from_mesh_takes_any_mesh(tmp_path):
+    write_ring(tmp_path / "part.stl")
+    scene = load_scene("from_mesh", mesh=str(tmp_path / "part.stl"), unit="cm", cell_size=8e-2)
+    assert scene.mass == pytest.approx(1000.0 * load_scene("from_mesh", cell_size=8e-3).mass)
+    with pytest.raises(InputError, match=r"scene from_mesh: mesh 'none.stl': expected a file that can be read, got no"):
+        load_scene("from_mesh", mesh="none.stl")
