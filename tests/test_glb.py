@@ -6,9 +6,9 @@ import struct
 import numpy as np
 import pytest
 import trimesh
-from frames_for_tests import FRAMES, TIMES, frame, written
 from pxr import Usd, UsdGeom, Vt
 from scenes_for_tests import OPEN, block
+from usd_frames import FRAMES, RANGE, TIMES, frame_of, written
 
 from warp_mpm.errors import InputError
 from warp_mpm.output import colormap
@@ -29,7 +29,7 @@ def scene():
 def run(scene, tmp_path_factory):
     """A run directory with three frames."""
     directory = tmp_path_factory.mktemp("run")
-    written(directory, scene).close()
+    written(directory / "block.usdc", scene).close()
     return directory
 
 
@@ -39,8 +39,8 @@ def y_up(position):
 
 
 def colors(pressure):
-    """Linear RGB of pressures, of which the map's last colour is 1 GPa."""
-    return colormap.linear_table()[colormap.indices(pressure, 0.0, 1e9)]
+    """Linear RGB of pressures."""
+    return colormap.linear_table()[colormap.indices(pressure, *RANGE)]
 
 
 def placed(path):
@@ -80,7 +80,7 @@ def parsed(path):
 @pytest.mark.parametrize("index", range(FRAMES))
 def test_another_reader_sees_the_frame(scene, run, tmp_path, index):
     """Particles that are still there, and the section, in their places and colours, y up."""
-    saved = frame(scene, index)
+    saved = frame_of(scene, index)
     path = export(run, tmp_path / "block.glb", index)
     assert path == tmp_path / "block.glb"
     shapes = placed(path)
@@ -113,7 +113,7 @@ def test_it_keeps_to_the_rules(scene, run, tmp_path):
         assert arrays[color].min() >= 0.0
         assert arrays[color].max() <= 1.0
         assert document["materials"][primitive["material"]]["extensions"] == {"KHR_materials_unlit": {}}
-    saved = frame(scene, 2)
+    saved = frame_of(scene, 2)
     particles = document["meshes"][0]["primitives"][0]
     assert particles["mode"] == 0
     np.testing.assert_array_equal(arrays[particles["attributes"]["POSITION"]], saved.position[saved.inside])
@@ -122,7 +122,7 @@ def test_it_keeps_to_the_rules(scene, run, tmp_path):
     assert section["mode"] == 4
     assert arrays[section["indices"]].max() < saved.section.size
     notes = document["scenes"][0]["extras"]
-    assert notes == {"time_s": TIMES[2], "frame": 2, "color_map": "inferno", "color_range_pa": [0.0, 1e9]}
+    assert notes == {"time_s": TIMES[2], "frame": 2, "color_map": "inferno", "color_range_pa": list(RANGE)}
 
 
 def test_other_surfaces_and_what_is_not_seen(run, tmp_path):

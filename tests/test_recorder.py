@@ -19,6 +19,7 @@ from warp_mpm.materials import ammonium_nitrate
 from warp_mpm.recorder import Recorder, nodes_near_point, nodes_near_segment
 from warp_mpm.scene import Domain, SectionPlane, Segment
 from warp_mpm.section import section_pressure
+from warp_mpm.state import NUMBER
 
 DOMAIN = Domain((-0.01, 0.0, 0.0), (0.09, 0.06, 0.02), (10, 4, 2))  # cells of 10 x 15 x 10 mm
 
@@ -100,10 +101,10 @@ def fill_grid(state, pressure, filling):
     pressures, values = np.full(shape, 1e12), np.zeros((*shape, 8))
     inside = (slice(1, -1),) * 3
     pressures[inside], values[(*inside, 7)] = pressure, filling
-    field = np.zeros((pressures.size + 1, 2), dtype=np.float32)  # it has a node to spare
+    field = np.zeros((pressures.size + 1, 2), dtype=NUMBER)  # it has a node to spare
     field[:-1, 0] = pressures.ravel()
     state.grid.field.assign(field)
-    state.grid.node.assign(values.reshape(-1, 8).astype(np.float32))
+    state.grid.node.assign(values.reshape(-1, 8).astype(NUMBER))
 
 
 def node_places():
@@ -141,9 +142,9 @@ def test_regions_and_lines(device):
     record = recorder.result()
     counted = np.where(filling >= 0.5, pressure, 0.0)
     path = distances((0.0, 0.03, 0.01), (0.05, 0.03, 0.01))
-    assert record.path_pressure[0] == np.float32(counted[path <= 1.0 + 1e-6].max())
+    assert record.path_pressure[0] == NUMBER.type(counted[path <= 1.0 + 1e-6].max())
     for number, point in enumerate(scene.collision_points):
-        assert record.point_pressures[0, number] == np.float32(counted[distances(point, point) <= 2.0 + 1e-6].max())
+        assert record.point_pressures[0, number] == NUMBER.type(counted[distances(point, point) <= 2.0 + 1e-6].max())
 
     place = node_places()
     fill_grid(solver.state, 1e9 + place @ [1e9, 2e9, -3e9], np.zeros(pressure.shape))
@@ -224,7 +225,7 @@ def test_records_survive_many_steps(device, monkeypatch):
             taken.append(recorder.take_peak())
     record = recorder.result()
     np.testing.assert_array_equal(record.time, [time for time, _ in clocks])
-    np.testing.assert_array_equal(record.dt, np.float32([dt for _, dt in clocks]))
+    np.testing.assert_array_equal(record.dt, [dt for _, dt in clocks])
     peaks = record.field_pressure
     assert taken == [peaks[:10].max(), peaks[10:20].max(), peaks[20:30].max()]
     assert record.path_pressure is None

@@ -1,14 +1,15 @@
 """The export for ParaView: read back by meshio and by VTK it is what the run saved, of finished and of killed runs."""
 
 import shutil
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import meshio
 import numpy as np
 import pytest
-from frames_for_tests import FIELDS, FRAMES, TIMES, frame, written
 from pxr import Sdf, Usd, UsdGeom, Vt
 from scenes_for_tests import OPEN, block
+from usd_frames import FIELDS, FRAMES, RANGE, TIMES, frame_of, written
 
 from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.output import vtk as vtk_output
@@ -29,7 +30,7 @@ def run(scene, tmp_path):
     """A run directory with three frames."""
     directory = tmp_path / "run"
     directory.mkdir()
-    written(directory, scene).close()
+    written(directory / "block.usdc", scene).close()
     return directory
 
 
@@ -68,9 +69,9 @@ def test_what_is_read_back_is_what_was_saved(scene, run, tmp_path, read):
     path = export(run, tmp_path / "block.pvd")
     assert path == tmp_path / "block.pvd"
     times, files = series(path)
-    assert times == list(TIMES)
+    assert times == TIMES
     for index, file in enumerate(files):
-        saved = frame(scene, index)
+        saved = frame_of(scene, index)
         points, kind, corners, data = read(file)
         assert kind == "vertex"
         np.testing.assert_array_equal(corners.ravel(), np.arange(len(points)))
@@ -81,11 +82,11 @@ def test_what_is_read_back_is_what_was_saved(scene, run, tmp_path, read):
         for name in FIELDS:
             np.testing.assert_array_equal(data[name], saved.fields[name][saved.inside])
     times, files = series(tmp_path / "block_section.pvd")
-    assert times == list(TIMES)
+    assert times == TIMES
     for index, file in enumerate(files):
         points, kind, corners, data = read(file)
         assert kind == "quad"
-        np.testing.assert_array_equal(data["pressure"], frame(scene, index).section.ravel())
+        np.testing.assert_array_equal(data["pressure"], frame_of(scene, index).section.ravel())
         sides = points[np.roll(corners, -1, axis=1)] - points[corners]
         np.testing.assert_allclose(np.linalg.norm(sides, axis=-1), 0.01, rtol=1e-5)  # squares as large as the cells
         assert len(corners) * 0.01**2 == pytest.approx(np.prod([np.ptp(points[:, a]) for a in scene.section.in_plane]))
@@ -109,11 +110,11 @@ def test_a_killed_run(scene, tmp_path):
     """Frames that are still in clips, and no more of them than there are."""
     run = tmp_path / "run"
     run.mkdir()
-    written(run, scene, frames=2)
+    written(run / "block.usdc", scene, frames=2)
     (run / "block.part.usdc").write_bytes(b"killed while the frames were merged")
     times, files = series(export(run, tmp_path / "killed.pvd"))
-    assert times == list(TIMES[:2])
-    saved = frame(scene, 1)
+    assert times == TIMES[:2]
+    saved = frame_of(scene, 1)
     np.testing.assert_array_equal(meshio.read(files[1]).point_data["pressure"], saved.pressure[saved.inside])
 
 
@@ -145,9 +146,9 @@ def test_a_surface_that_changes(tmp_path):
 def test_times_rise(tmp_path):
     """A run of fewer steps than frames repeats some; ParaView would show those of one time on top of each other."""
     scene = block((3, 3, 3))
-    with UsdWriter(tmp_path / "block.usdc", scene, pressure_range=(0.0, 1e9), frames=3, fields=FIELDS) as writer:
+    with UsdWriter(tmp_path / "block.usdc", scene, pressure_range=RANGE, frames=FRAMES, fields=FIELDS) as writer:
         for index, time in enumerate((0.0, 1e-6, 1e-6)):
-            writer.write(frame(scene, index, time))
+            writer.write(replace(frame_of(scene, index), time=time))
     times, files = series(export(tmp_path, tmp_path / "block.pvd"))
     assert times == [0.0, 1e-6]
     assert [file.stem for file in files] == ["particles_00000", "particles_00001"]

@@ -1,4 +1,4 @@
-"""A scene and frames of it that nobody solved, for tests of the USD file."""
+"""A scene and frames of scenes that nobody solved, for tests of the USD file and of what is exported from it."""
 
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from warp_mpm.scene import Scene
 RANGE = (0.0, 4.0e9)  # [Pa]
 FIELDS = ("density", "particleVelocity")
 FRAMES = 3
-LEFT = 5  # the particle that leaves, in the last frame
+LEFT = 5  # the particle that leaves, in the last frame, if faces are open
 END_TIME = 20e-6  # [s]
 TIMES = [END_TIME * index / (FRAMES - 1) for index in range(FRAMES)]
 
@@ -61,11 +61,11 @@ def surface_of(index: int) -> Surface:
 
 
 def frame_of(scene: Scene, index: int) -> Frame:
-    """Gas that drifts along x, with pressures in and beyond the range; one particle leaves in the last frame."""
+    """Gas that drifts along x, with pressures in and beyond the range; one particle may leave in the last frame."""
     count = scene.particle_count
     position = np.concatenate([charge.positions for charge in scene.charges]) + index * np.array([1e-3, 0.0, 0.0])
     inside = np.ones(count, dtype=bool)
-    inside[LEFT] = index < FRAMES - 1
+    inside[LEFT] = index < FRAMES - 1 or scene.walls != OPEN
     fields = {
         "density": np.linspace(900.0, 1100.0, count, dtype=np.float32),
         "particleVelocity": np.full((count, 3), index, dtype=np.float32),

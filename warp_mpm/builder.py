@@ -44,7 +44,7 @@ class SceneBuilder:
         Raises:
             InputError: the name does not suit a file name.
         """
-        if not re.fullmatch(NAME, name):
+        if not isinstance(name, str) or not re.fullmatch(NAME, name):
             raise mistake("scene: name", NAME_EXPECTED, repr(name))
         self.name = name
         self.description = description
@@ -142,6 +142,7 @@ class SceneBuilder:
         """
         name = f"charge_{len(self._bodies) + 1}" if name is None else name
         here = f"{self._here}: charge {name!r}"
+        checks.instance(f"{here}: name", name, str, "a text")
         if any(body.name == name for body in self._bodies):
             raise mistake(here, "a name of its own", "one that another charge has")
         checks.instance(f"{here}: solid", solid, Solid, "a Solid, such as Box, Sphere or Cylinder")
@@ -152,8 +153,10 @@ class SceneBuilder:
         checks.instance(f"{here}: material", material, Material, "a Material")
         per_axis = checks.count(f"{here}: particles_per_axis", particles_per_axis)
         if velocity is not None and not callable(velocity):
-            velocity = checks.vector(f"{here}: velocity", velocity)
-        checks.instance(f"{here}: may_stay_unlit", may_stay_unlit, bool, "True or False")
+            velocity = checks.vector(
+                f"{here}: velocity", velocity, "give (vx, vy, vz) [m/s], or a function of positions"
+            )
+        checks.flag(f"{here}: may_stay_unlit", may_stay_unlit)
         self._bodies.append(Body(name, solid, material, per_axis, velocity, may_stay_unlit))
 
     def detonator(self, *detonators: Detonator) -> None:
@@ -251,7 +254,7 @@ class SceneBuilder:
             raise mistake(f"{here}: name", NAME_EXPECTED, repr(name))
         if any(gauge.name == name for gauge in self._gauges):
             raise mistake(here, "a name of its own", "one that another gauge has")
-        checks.instance(f"{here}: moving", moving, bool, "True or False")
+        checks.flag(f"{here}: moving", moving)
         self._gauges.append(Gauge(name, checks.vector(f"{here}: point", point), moving))
 
     def picture_times(self, times: Iterable[float]) -> None:
@@ -260,7 +263,9 @@ class SceneBuilder:
         Raises:
             InputError: one is not a finite number of at least 0.
         """
-        self._picture_times = tuple(checks.not_negative(f"{self._here}: picture_times", time) for time in times)
+        here = f"{self._here}: picture_times"
+        checks.instance(here, times, Iterable, "numbers of at least 0")
+        self._picture_times = tuple(checks.not_negative(here, time) for time in times)
 
     def section(self, axis: int, coordinate: float) -> None:
         """Set the plane, normal to `axis` (0, 1, 2) at `coordinate` [m], on which the field pressure is shown.
@@ -271,7 +276,7 @@ class SceneBuilder:
             InputError: not an axis, or not a finite number.
         """
         here = f"{self._here}: section"
-        if axis not in (0, 1, 2):
+        if isinstance(axis, bool) or axis not in (0, 1, 2):
             raise mistake(f"{here}: axis", "0, 1 or 2", repr(axis))
         self._section = SectionPlane(int(axis), checks.finite(f"{here}: coordinate", coordinate))
 
@@ -334,7 +339,7 @@ class SceneBuilder:
     def _segment(self, name: str, start: Sequence[float], end: Sequence[float]) -> Segment:
         here = f"{self._here}: {name}"
         segment = Segment(checks.vector(f"{here}: start", start), checks.vector(f"{here}: end", end))
-        if segment.start == segment.end:
+        if segment.length == 0.0:  # their difference may be too small for a number
             raise mistake(f"{here}: end", "another point than start", segment.end)
         return segment
 

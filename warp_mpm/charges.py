@@ -162,17 +162,18 @@ def _initial_velocities(where: str, velocity: Velocity | None, positions: np.nda
     else:
         given = velocity(positions.copy())  # a copy: the function may work in place
         expected = f"a function that turns positions {positions.shape} into finite velocities {positions.shape}"
+        remedy = "return three finite numbers [m/s] for each position, such as np.zeros_like(positions)"
         try:
             velocities = np.array(given, dtype=float)
         except (TypeError, ValueError):
-            raise mistake(where, expected, f"one that returns {type(given).__name__}") from None
+            raise mistake(where, expected, f"one that returns {type(given).__name__}", remedy) from None
         if velocities.shape != positions.shape:
-            raise mistake(where, expected, f"one that returns shape {velocities.shape}")
+            raise mistake(where, expected, f"one that returns shape {velocities.shape}", remedy)
         wrong = ~np.isfinite(velocities).all(axis=1)
         if wrong.any():
             first = int(np.argmax(wrong))
             got, place = (", ".join(f"{value:g}" for value in row[first]) for row in (velocities, positions))
-            raise mistake(where, expected, f"one that returns ({got}) at ({place}) m")
+            raise mistake(where, expected, f"one that returns ({got}) at ({place}) m", remedy)
     return velocities if velocities.any() else None
 
 

@@ -1,19 +1,28 @@
 """Checks of single values that a user gives; each error is one line: where, expected, got."""
 
-import math
 from collections.abc import Callable, Iterable
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any, TypeVar
 
 from warp_mpm.errors import InputError
+from warp_mpm.kernels.numbers import is_number
 
 Vector = tuple[float, float, float]
 Number = TypeVar("Number", int, float)
+
+LARGEST_COUNT = 2**31 - 1
+LONGEST = 80  # characters of a wrong value that a message shows
 
 
 def mistake(where: str, expected: str, got: object, remedy: str = "") -> InputError:
     """The error to raise when a value is wrong: one line that says where, expected, got, and the remedy if any."""
     return InputError(f"{where}: expected {expected}, got {got}" + (f"; {remedy}" if remedy else ""))
+
+
+def shortened(value: Any) -> str:
+    """How a wrong value is shown in a message: in one line that is not too long."""
+    shown = " ".join(repr(value).split())
+    return shown if len(shown) <= LONGEST else f"{shown[:LONGEST]}..."
 
 
 def finite(where: str, value: Any, expected: str = "a finite number") -> float:
@@ -22,8 +31,8 @@ def finite(where: str, value: Any, expected: str = "a finite number") -> float:
     Raises:
         InputError: it is not a finite real number.
     """
-    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
-        raise mistake(where, expected, repr(value))
+    if not is_number(value):
+        raise mistake(where, expected, shortened(value))
     return float(value)
 
 
@@ -36,7 +45,7 @@ def positive(where: str, value: Any) -> float:
     expected = "a positive number"
     number = finite(where, value, expected)
     if number <= 0.0:
-        raise mistake(where, expected, repr(value))
+        raise mistake(where, expected, shortened(value))
     return number
 
 
@@ -49,7 +58,7 @@ def not_negative(where: str, value: Any) -> float:
     expected = "a number of at least 0"
     number = finite(where, value, expected)
     if number < 0.0:
-        raise mistake(where, expected, repr(value))
+        raise mistake(where, expected, shortened(value))
     return number
 
 
@@ -57,14 +66,37 @@ def count(where: str, value: Any) -> int:
     """`value` as an int of at least one.
 
     Raises:
-        InputError: it is not a whole number of at least one.
+        InputError: it is not a whole number of at least one, or one that 32 bits do not hold.
     """
     if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
-        raise mistake(where, "a whole number of at least 1", repr(value))
+        raise mistake(where, "a whole number of at least 1", shortened(value))
+    if int(value) > LARGEST_COUNT:
+        raise mistake(where, f"at most {LARGEST_COUNT}", shortened(value))
     return int(value)
 
 
-def vector(where: str, value: Any) -> Vector:
+def flag(where: str, value: Any) -> bool:
+    """`value` itself.
+
+    Raises:
+        InputError: it is neither True nor False.
+    """
+    return bool(instance(where, value, bool, "True or False"))
+
+
+def names(where: str, value: Any) -> tuple[str, ...]:
+    """`value` as a tuple of texts.
+
+    Raises:
+        InputError: it is not several texts; one alone is refused too.
+    """
+    parts = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (None,)
+    if not all(isinstance(part, str) for part in parts):
+        raise mistake(where, 'names in a tuple, such as ("a", "b")', shortened(value))
+    return parts
+
+
+def vector(where: str, value: Any, remedy: str = "") -> Vector:
     """`value` as three floats.
 
     Raises:
@@ -73,8 +105,11 @@ def vector(where: str, value: Any) -> Vector:
     expected = "three finite numbers"
     parts = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
     if len(parts) != 3:
-        raise mistake(where, expected, repr(value))
-    x, y, z = (finite(where, part, expected) for part in parts)
+        raise mistake(where, expected, shortened(value), remedy)
+    for part in parts:
+        if not is_number(part):
+            raise mistake(where, expected, shortened(part), remedy)
+    x, y, z = (float(part) for part in parts)
     return (x, y, z)
 
 
@@ -88,7 +123,7 @@ def each(where: str, value: Any, length: int, check: Callable[[str, Any], Number
         return [check(where, value)] * length
     parts = list(value)
     if len(parts) != length:
-        raise mistake(where, f"one number or {length}", repr(value))
+        raise mistake(where, f"one number or {length}", shortened(value))
     return [check(where, part) for part in parts]
 
 
@@ -99,5 +134,5 @@ def instance(where: str, value: Any, kind: Any, expected: str) -> Any:
         InputError: it is not an instance of `kind`, which the message calls `expected`.
     """
     if not isinstance(value, kind):
-        raise mistake(where, expected, repr(value))
+        raise mistake(where, expected, shortened(value))
     return value

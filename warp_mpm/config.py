@@ -1,11 +1,13 @@
 """How a scene is solved (`SolverConfig`) and when results are saved (`Save`): immutable, separate from the scene."""
 
-import math
 from dataclasses import dataclass
 from enum import Enum
 
-from warp_mpm.checks import count, instance, positive
+from warp_mpm.checks import count, flag, instance, names, positive, shortened
 from warp_mpm.errors import InputError
+from warp_mpm.kernels.numbers import is_number
+
+MOST_FRAMES = 1_000_000  # of a run; each is a file for a while, and more than anyone looks at
 
 
 class ShapeFunction(Enum):
@@ -57,11 +59,17 @@ class SolverConfig:
         Raises:
             InputError: a value is out of range, or two of them exclude each other.
         """
-        _check("pic_share", 0.0 <= self.pic_share <= 1.0, "a share between 0 and 1", self.pic_share)
+        instance("solver: shape", self.shape, ShapeFunction, "a ShapeFunction, such as ShapeFunction.BSPLINE")
+        instance("solver: order", self.order, Order, "an Order, such as Order.MUSL")
+        instance("solver: transfer", self.transfer, Transfer, "a Transfer, such as Transfer.FLIP")
+        share_ok = is_number(self.pic_share) and 0.0 <= self.pic_share <= 1.0
+        _check("pic_share", share_ok, "a share between 0 and 1", self.pic_share)
         if self.burn_width is not None:
-            _check("burn_width", 0.0 < self.burn_width < math.inf, "a positive number of cells", self.burn_width)
-        _check("cfl", 0.0 < self.cfl <= 1.0, "a Courant number above 0, at most 1", self.cfl)
-        viscosity_ok = len(self.viscosity) == 2 and all(0.0 <= c < math.inf for c in self.viscosity)
+            width_ok = is_number(self.burn_width) and self.burn_width > 0.0
+            _check("burn_width", width_ok, "a positive number of cells", self.burn_width)
+        _check("cfl", is_number(self.cfl) and 0.0 < self.cfl <= 1.0, "a Courant number above 0, at most 1", self.cfl)
+        viscosity_ok = isinstance(self.viscosity, (tuple, list)) and len(self.viscosity) == 2
+        viscosity_ok = viscosity_ok and all(is_number(c) and c >= 0.0 for c in self.viscosity)
         _check("viscosity", viscosity_ok, "two non-negative coefficients, quadratic and linear", self.viscosity)
         if self.transfer is Transfer.DAMPED_FLIP and self.order is not Order.MUSL:
             raise InputError(
@@ -107,8 +115,12 @@ class Save:
         Raises:
             InputError: a value is out of range, or a field is unknown.
         """
-        if self.frames < 2:
+        if count("save: frames", self.frames) < 2:
             raise InputError(f"save: frames: expected at least 2, the first and the last, got {self.frames}")
+        if self.frames > MOST_FRAMES:
+            raise InputError(f"save: frames: expected at most {MOST_FRAMES}, got {self.frames}")
+        flag("save: figures", self.figures)
+        flag("save: usdz", self.usdz)
         instance("save: layout", self.layout, Layout, "a Layout, such as Layout.CLIPS")
         count("save: particles_every", self.particles_every)
         if self.isosurface is not None:
@@ -116,7 +128,7 @@ class Save:
         if self.checkpoint_steps is not None:
             count("save: checkpoint_steps", self.checkpoint_steps)
         positive("save: checkpoint_minutes", self.checkpoint_minutes)
-        for name in self.fields:
+        for name in names("save: fields", self.fields):
             if name not in PARTICLE_FIELDS:
                 raise InputError(f"save: fields: expected any of {', '.join(PARTICLE_FIELDS)}, got {name!r}")
 
@@ -126,4 +138,4 @@ PARTICLE_FIELDS = ("density", "burn_fraction", "arrival_time", "particleVelocity
 
 def _check(name: str, valid: bool, expected: str, got: object) -> None:
     if not valid:
-        raise InputError(f"solver: {name}: expected {expected}, got {got}")
+        raise InputError(f"solver: {name}: expected {expected}, got {shortened(got)}")

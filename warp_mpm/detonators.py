@@ -89,6 +89,7 @@ def row(
         InputError: a number is not finite, or there are fewer than two points.
     """
     first, last = checks.vector("row: start", start), checks.vector("row: end", end)
+    time, delay = checks.finite("row: time", time), checks.finite("row: delay", delay)
     places = np.linspace(first, last, _several("row: count", count, 2))
     return tuple(_point(place, time + delay * number) for number, place in enumerate(places))
 
@@ -115,6 +116,7 @@ def ring(
         raise mistake("ring: axis", "a vector of any length but 0", axis)
     normal /= np.linalg.norm(normal)
     radius, count = checks.positive("ring: radius", radius), _several("ring: count", count, 1)
+    time, delay = checks.finite("ring: time", time), checks.finite("ring: delay", delay)
     first = np.eye(3)[np.argmin(np.abs(normal))]
     first = first - normal * (first @ normal)
     first /= np.linalg.norm(first)
@@ -149,9 +151,11 @@ def grid(
     origin = np.array(checks.vector("grid: corner", corner))
     edges = [checks.vector(f"grid: {name}", edge) for name, edge in (("first", first), ("second", second))]
     rows, columns = checks.each("grid: counts", counts, 2, checks.count)
+    time = checks.finite("grid: time", time)
+    delay, other_delay = checks.each("grid: delays", delays, 2, checks.finite)
     steps = [np.array(edge) / max(count - 1, 1) for edge, count in zip(edges, (rows, columns), strict=True)]
     return tuple(
-        _point(origin + i * steps[0] + j * steps[1], time + i * delays[0] + j * delays[1])
+        _point(origin + i * steps[0] + j * steps[1], time + i * delay + j * other_delay)
         for i in range(rows)
         for j in range(columns)
     )
@@ -166,9 +170,10 @@ def checked(where: str, detonator: object) -> Detonator:
     """
     names = "a PointDetonator, LineDetonator, PlaneDetonator, SphereDetonator or CordDetonator"
     given: Detonator = checks.instance(where, detonator, Detonator, names)
-    time, charges = checks.not_negative(f"{where}: time", given.time), given.charges
+    time, charges = checks.not_negative(f"{where}: time", given.time), checks.names(f"{where}: charges", given.charges)
     if isinstance(given, PointDetonator):
-        return PointDetonator(checks.vector(f"{where}: position", given.position), time, charges, given.booster)
+        booster = checks.flag(f"{where}: booster", given.booster)
+        return PointDetonator(checks.vector(f"{where}: position", given.position), time, charges, booster)
     if isinstance(given, PlaneDetonator):
         position = checks.vector(f"{where}: position", given.position)
         normal = checks.vector(f"{where}: normal", given.normal)
@@ -213,6 +218,7 @@ def _middle(start: Vector, end: Vector) -> Vector:
 
 def _polyline(where: str, points: Sequence[Vector]) -> tuple[Vector, ...]:
     """The points, two or more, no two in a row the same."""
+    checks.instance(where, points, Sequence, "points, each three finite numbers")
     places = tuple(checks.vector(f"{where}: point {number}", point) for number, point in enumerate(points, start=1))
     if len(places) < 2 or any(a == b for a, b in pairwise(places)):
         raise mistake(where, "two points or more, each apart from the one before", places)

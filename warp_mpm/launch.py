@@ -13,6 +13,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mpm import checks
 from warp_mpm.errors import InputError
 from warp_mpm.warp_startup import start_quietly
 
@@ -32,11 +33,11 @@ class Launcher:
 
     def __init__(self, device: wp.Device, threads: int | None = None, graphs: bool | None = None) -> None:
         available = available_cores()
-        if threads is not None and threads < 1:
-            raise InputError(f"threads: expected at least 1, got {threads}; leave it out for all {available} cores")
+        if threads is not None:
+            checks.count("threads", threads)
         self.device = device
         self.graphs = device.is_cuda if graphs is None else graphs
-        self.threads = 1 if self.graphs else (threads or available)
+        self.threads = 1 if self.graphs or kernels_are_checked() else (threads or available)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
 
     def record(self, kernel: wp.Kernel, count: int, inputs: Sequence[Any]) -> Any:
@@ -69,6 +70,15 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def kernels_are_checked() -> bool:
+    """Whether Warp compiles kernels for debugging; two that run at a time then crash.
+
+    Each kernel puts a pointer to its own stack into one variable of its module (`shared_tile_storage` in Warp's
+    `tile.h`), and puts back what was there when it ends. Only the checks at its end read it.
+    """
+    return wp.config.mode == "debug"
 
 
 def find_device(name: str | None) -> wp.Device:

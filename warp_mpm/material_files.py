@@ -77,7 +77,7 @@ def load_materials(path: str | Path) -> dict[str, Material]:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise mistake("materials", "a TOML file", repr(str(path)), str(error.strerror)) from error
-    except ValueError as error:  # no TOML, or no text
+    except (ValueError, RecursionError) as error:  # no TOML, or no text
         raise mistake(str(path), "TOML", " ".join(str(error).split())) from error
     return {name: _material(str(path), name, table) for name, table in tables.items()}
 

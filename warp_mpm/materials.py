@@ -1,10 +1,10 @@
 """Materials: equation of state, density, energy, and for explosives a burn law that is checked when it is made."""
 
-import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal
+from typing import Any, Literal
 
+from warp_mpm import checks
 from warp_mpm.errors import InputError
 from warp_mpm.exact.chapman_jouguet import (
     ChapmanJouguetState,
@@ -18,6 +18,7 @@ from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
 from warp_mpm.kernels.eos import EquationOfState
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.kernels.numbers import is_number
 from warp_mpm.warp_startup import start_quietly
 
 ROUND_OFF = 1e-5  # relative difference of two speeds that are the same: single precision, and the digits people write
@@ -71,6 +72,9 @@ class Material:
 
     def __post_init__(self) -> None:
         """Check the values."""
+        _check_kind(self.name, self.equation_of_state)
+        if self.unreacted is not None:
+            _check_kind(self.name, self.unreacted, "unreacted")
         _check_positive(self.name, "density", self.density, "kg/m3")
         _check_positive(self.name, "specific_energy", self.specific_energy, "J/kg")
 
@@ -99,14 +103,13 @@ def explosive(
     Raises:
         InputError: a value is not positive and finite, or speed or pressure do not match the equation of state.
     """
+    _check_kind(name, equation_of_state)
+    checks.instance(f"{name}: on_mismatch", on_mismatch, OnMismatch, "an OnMismatch, such as OnMismatch.KEEP")
+    checks.instance(f"{name}: burn", burn, Burn, "a Burn, such as Burn.COMPRESSION")
     _check_positive(name, "density", density, "kg/m3")
     _check_positive(name, "detonation_speed", detonation_speed, "m/s")
     start_quietly()  # the check evaluates device functions, which starts Warp
-    if energy == "cj":
-        specific_energy = energy_for_speed(equation_of_state, density, detonation_speed)
-    else:
-        specific_energy = float(energy)
-        _check_positive(name, "energy", specific_energy, "J/kg")
+    specific_energy = _specific_energy(name, energy, equation_of_state, density, detonation_speed)
     state = chapman_jouguet_state(equation_of_state, density, specific_energy)
     speed, warnings = _matched_speed(name, density, detonation_speed, equation_of_state, state, on_mismatch)
     if cj_pressure is not None:
@@ -137,6 +140,7 @@ def inert(
     Raises:
         InputError: density or pressure is not positive and finite, or the energy that gives this pressure is not.
     """
+    _check_kind(name, equation_of_state)
     _check_positive(name, "density", density, "kg/m3")
     _check_positive(name, "pressure", pressure, "Pa")
     start_quietly()
@@ -163,6 +167,14 @@ def ammonium_nitrate(*, energy: float | Literal["cj"] = "cj", on_mismatch: OnMis
         on_mismatch=on_mismatch,
         citation="Wang, Li, Wang, Yan, Sun, Applied Mathematics and Mechanics 36(2), 2015; energy by the CJ condition",
     )
+
+
+def _specific_energy(name: str, energy: float | str, eos: EquationOfState, density: float, speed: float) -> float:
+    """The energy [J/kg] given, or for "cj" that with which the wave runs at `speed` [m/s]."""
+    if isinstance(energy, str) and energy == "cj":
+        return energy_for_speed(eos, density, speed)
+    _check_positive(name, "energy", energy, "J/kg")
+    return float(energy)
 
 
 def _burn_law(burn: Burn, speed: float, density: float, state: ChapmanJouguetState) -> BurnLaw:
@@ -213,6 +225,13 @@ def _matched_pressure(name: str, stated: float, state: ChapmanJouguetState, on_m
     return (f"{text}, got {stated:.4g}",)
 
 
-def _check_positive(name: str, quantity: str, value: float, unit: str) -> None:
-    if not (isinstance(value, (int, float)) and 0.0 < value < math.inf):
-        raise InputError(f"{name}: {quantity}: expected a positive finite number of {unit}, got {value}")
+def _check_positive(name: str, quantity: str, value: Any, unit: str) -> None:
+    if not (is_number(value) and value > 0.0):
+        raise checks.mistake(f"{name}: {quantity}", f"a positive finite number of {unit}", checks.shortened(value))
+
+
+def _check_kind(name: str, equation_of_state: object, role: str = "equation_of_state") -> None:
+    checks.instance("material: name", name, str, "a text")
+    if isinstance(equation_of_state, type) or not isinstance(equation_of_state, EquationOfState):
+        got = checks.shortened(equation_of_state)
+        raise checks.mistake(f"{name}: {role}", "an equation of state, such as IdealGas(gamma=1.4)", got)

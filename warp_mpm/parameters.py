@@ -9,11 +9,12 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from enum import Enum
-from numbers import Integral, Real
+from numbers import Integral
 from types import NoneType, UnionType
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
 from warp_mpm.checks import mistake
+from warp_mpm.kernels.numbers import is_number
 
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
@@ -159,7 +160,7 @@ def _scalar_from_python(value: Any, kind: Any) -> Any:
         return value
     if kind is int and isinstance(value, Integral) and not isinstance(value, bool):
         return int(value)
-    if kind is float and isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value):
+    if kind is float and is_number(value):
         return float(value)
     raise _UnsuitableError
 

@@ -145,13 +145,13 @@ def _guarded(run: Callable[[], Any], file: SceneFile, where: str) -> Any:
     except ValueError as error:  # a value that the builder, a material or the scene itself refuses
         text = " ".join(str(error).split())
         raise InputError(text if text.startswith(where) else f"{where}: {text}") from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         text = " ".join(str(error).split())
         line = _line_in(file, error)
         raise InputError(f"{where}: {file.path}:{line}: {type(error).__name__}: {text}") from error
 
 
-def _line_in(file: SceneFile, error: Exception) -> int | None:
+def _line_in(file: SceneFile, error: BaseException) -> int | None:
     """The line of the scene file at which an error arose."""
     if isinstance(error, SyntaxError):
         return error.lineno

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from warp_mpm import checks
 from warp_mpm.checkpoint import Checkpoints, part, restore_solver, saved_solver
 from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, sparse_share, totals_of
@@ -82,7 +83,8 @@ def simulate(
             is no checkpoint, or one of something else.
         SimulationError: the run cannot go on.
     """
-    run = _Run(scene, config or SolverConfig(), save or Save(), output, device, threads, progress or Silent(), resume)
+    config, save = SolverConfig() if config is None else config, Save() if save is None else save
+    run = _Run(scene, config, save, output, device, threads, progress or Silent(), resume)
     try:
         run.to_the_end()
     except (KeyboardInterrupt, Terminated):
@@ -113,8 +115,10 @@ class _Run:
         progress: Progress,
         resume: bool,
     ) -> None:
-        self.scene = scene
-        self.save = save
+        self.scene = checks.instance("simulate: scene", scene, Scene, "a Scene")
+        self.save = checks.instance("simulate: save", save, Save, "a Save")
+        checks.instance("simulate: config", config, SolverConfig, "a SolverConfig")
+        checks.flag("simulate: resume", resume)
         self.progress = progress
         self.begin = time.perf_counter()  # [s]; of a resumed run, as if it had gone on all the time
         self.launcher = Launcher(find_device(device), threads)

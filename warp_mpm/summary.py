@@ -83,7 +83,7 @@ def front_speed(record: StepRecord, material: Material) -> FrontSpeed | None:
     arrived = arrival_times(record.path, ARRIVAL_SHARE * material.cj.pressure)
     low, high = (share * distance[-1] for share in FITTED_PART)
     used = np.isfinite(arrived) & np.isfinite(expected) & (distance >= low) & (distance <= high)
-    if used.sum() < 3:
+    if used.sum() < 3 or np.ptp(arrived[used]) == 0.0:
         return None
     time, way = arrived[used], material.burn.detonation_speed * expected[used]
     speed, start = np.polyfit(time, way, 1)
@@ -113,7 +113,7 @@ def meeting_points(scene: Scene, record: StepRecord, material: Material) -> list
             continue
         low = _arrival_fit(record.line.distance, arrived, below[-1], place)
         high = _arrival_fit(record.line.distance, arrived, above[0], place)
-        met.append((high[1] - low[1]) / (low[0] - high[0]) if low and high else None)
+        met.append((high[1] - low[1]) / (low[0] - high[0]) if low and high and low[0] != high[0] else None)
     return met
 
 

@@ -6,11 +6,11 @@ a booster or an impact to start, and runs at the speed that grid and viscosity g
 Reference: M. L. Wilkins, Computer Simulation of Dynamic Phenomena, Springer 1999, section 3.
 """
 
-import math
 from dataclasses import dataclass
 
 import warp as wp
 
+from warp_mpm.kernels.numbers import is_number
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 
 
@@ -56,9 +56,9 @@ class CompressionBurn:
     def __post_init__(self) -> None:
         """Check the values."""
         for name in ("detonation_speed", "density"):
-            if not 0.0 < getattr(self, name) < math.inf:
+            if not (is_number(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"compression burn: {name}: expected a positive number, got {getattr(self, name)}")
-        if not self.density < self.cj_density < math.inf:
+        if not (is_number(self.cj_density) and self.cj_density > self.density):
             raise ValueError(
                 f"compression burn: cj_density: expected more than the {self.density:g} kg/m3 at rest, "
                 f"got {self.cj_density}"

@@ -4,11 +4,11 @@ F = 0 before the arrival time t_b, (t - t_b) D / (r_b h) until t_b + r_b h / D, 
 Reference: M. L. Wilkins, Computer Simulation of Dynamic Phenomena, Springer 1999, section 3.
 """
 
-import math
 from dataclasses import dataclass
 
 import warp as wp
 
+from warp_mpm.kernels.numbers import is_number
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 
 
@@ -45,7 +45,7 @@ class ProgrammedBurn:
 
     def __post_init__(self) -> None:
         """Check the speed."""
-        if not 0.0 < self.detonation_speed < math.inf:
+        if not (is_number(self.detonation_speed) and self.detonation_speed > 0.0):
             raise ValueError(
                 f"programmed burn: detonation_speed: expected a positive number of m/s, got {self.detonation_speed}"
             )

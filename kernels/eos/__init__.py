@@ -13,13 +13,14 @@ dataclass (the host's side) whose class attributes name its device functions, ea
 Energies are specific internal energies [J/kg] that contain the chemical energy.
 """
 
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import warp as wp
 
 from warp_mpm.kernels.precision import scalar
 
 
+@runtime_checkable
 class EquationOfState(Protocol):
     """What a material asks of its equation of state."""
 

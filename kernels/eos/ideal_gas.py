@@ -1,10 +1,10 @@
 """Ideal gas, the gamma law: p = (gamma - 1) rho e (paper, eq. 17)."""
 
-import math
 from dataclasses import dataclass
 
 import warp as wp
 
+from warp_mpm.kernels.numbers import is_number
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 
 
@@ -51,7 +51,7 @@ class IdealGas:
 
     def __post_init__(self) -> None:
         """Check gamma: at 1 or below, compression would not raise the pressure of a gas with energy."""
-        if not 1.0 < self.gamma < math.inf:
+        if not (is_number(self.gamma) and self.gamma > 1.0):
             raise ValueError(f"ideal gas: gamma: expected a finite number above 1, got {self.gamma}")
 
     def record(self) -> IdealGasRecord:

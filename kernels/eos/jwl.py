@@ -27,6 +27,7 @@ from functools import cached_property
 
 import warp as wp
 
+from warp_mpm.kernels.numbers import is_number
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 
 LARGEST_EXPONENT = wp.constant(scalar(80.0))  # exp(-80) = 1.8e-35; exp(-88) is the last normal number
@@ -104,10 +105,10 @@ class JWL:
     def __post_init__(self) -> None:
         """Check the parameters."""
         for name in ("density", "r1", "r2", "omega"):
-            if not 0.0 < getattr(self, name) < math.inf:
+            if not (is_number(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"JWL: {name}: expected a positive finite number, got {getattr(self, name)}")
         for name in ("a", "b"):
-            if not 0.0 <= getattr(self, name) < math.inf:
+            if not (is_number(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"JWL: {name}: expected a finite number of at least 0 Pa, got {getattr(self, name)}")
 
     def record(self) -> JWLRecord:

@@ -10,11 +10,11 @@ section 3. Hugoniots of explosives: T. R. Gibbs, A. Popolato (eds.), LASL Explos
 California Press 1980.
 """
 
-import math
 from dataclasses import dataclass
 
 import warp as wp
 
+from warp_mpm.kernels.numbers import is_number
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar
 
 NEAR_POLE = 0.8  # largest s eta
@@ -88,10 +88,10 @@ class MieGruneisen:
     def __post_init__(self) -> None:
         """Check the parameters."""
         for name in ("density", "sound_speed"):
-            if not 0.0 < getattr(self, name) < math.inf:
+            if not (is_number(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"Mie-Gruneisen: {name}: expected a positive finite number, got {getattr(self, name)}")
         for name in ("slope", "gruneisen"):
-            if not 0.0 <= getattr(self, name) < math.inf:
+            if not (is_number(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(
                     f"Mie-Gruneisen: {name}: expected a finite number of at least 0, got {getattr(self, name)}"
                 )

@@ -4,11 +4,11 @@ Reference: F. H. Harlow, A. A. Amsden, Fluid Dynamics, LA-4700, Los Alamos 1971,
 ideal gas p_inf = 0).
 """
 
-import math
 from dataclasses import dataclass
 
 import warp as wp
 
+from warp_mpm.kernels.numbers import is_number
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 
 
@@ -57,9 +57,9 @@ class StiffenedGas:
 
     def __post_init__(self) -> None:
         """Check the parameters."""
-        if not 1.0 < self.gamma < math.inf:
+        if not (is_number(self.gamma) and self.gamma > 1.0):
             raise ValueError(f"stiffened gas: gamma: expected a finite number above 1, got {self.gamma}")
-        if not 0.0 <= self.stiffness < math.inf:
+        if not (is_number(self.stiffness) and self.stiffness >= 0.0):
             raise ValueError(
                 f"stiffened gas: stiffness: expected a finite number of at least 0 Pa, got {self.stiffness}"
             )

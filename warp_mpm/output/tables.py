@@ -5,6 +5,7 @@ import io
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
@@ -50,7 +51,7 @@ class TableWriter:
         with whole_file(self._path) as part:
             part.write_bytes(_csv([self._columns, *rows]).encode())
         try:
-            self._file = self._path.open("a", newline="", encoding="utf-8")
+            self._file = self._path.open("ab", buffering=0)  # what is kept back could not be written at the end either
         except OSError as error:
             raise write_error(self._path, error) from error
 
@@ -72,15 +73,19 @@ class TableWriter:
         self.extend([row_values(row, self._columns)])
 
     def extend(self, rows: Iterable[Sequence[Any]]) -> None:
-        """Add rows whose values are in the order of the columns, and are written as they are.
+        """Add rows whose values are in the order of the columns, and are written as they are; all of them or none.
 
         Raises:
             SimulationError: the disk is full or refuses.
         """
+        end = self._file.tell()
+        left = memoryview(_csv(rows).encode())
         try:
-            self._file.write(_csv(rows))
-            self._file.flush()
+            while left:
+                left = left[self._file.write(left) :]
         except OSError as error:
+            with suppress(OSError):
+                self._file.truncate(end)
             raise write_error(self._path, error) from error
 
     def close(self) -> None:
