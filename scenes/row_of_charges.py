@@ -40,18 +40,15 @@ def scene(
     builder.domain(box.lower, box.upper, cell_size=cell_size)
     builder.walls(Walls(x_low=Wall.OPEN, x_high=Wall.OPEN, y_high=Wall.OPEN))
     builder.ambient_pressure(ATMOSPHERE)
-    water = box
     for number in range(charges):
         place = number * SPACING
         name = f"charge_{number + 1}"
         rod = Cylinder((place, 0.0, 0.0), (place, 0.0, edge), RADIUS)
-        half = Box((place - RADIUS, 0.0, 0.0), (place + RADIUS, RADIUS, edge))
-        builder.charge(half - (box - rod), explosive, particles_per_axis=particles_per_axis, name=name)
+        builder.charge(box & rod, explosive, particles_per_axis=particles_per_axis, name=name)
         lit = number * not_negative("delay", delay)
         builder.detonator(LineDetonator((place, 0.0, 0.0), (place, 0.0, edge), time=lit, charges=(name,)))
         builder.gauge((place, 3.0 * RADIUS, edge / 2), name=f"beside_{number + 1}")
-        water = water - rod
-    builder.charge(water, find_material("water"), particles_per_axis=particles_per_axis, name="water")
+    builder.charge(box, find_material("water"), particles_per_axis=particles_per_axis, name="water")
     builder.line((-ROOM, 0.0, edge / 2), (box.upper[0], 0.0, edge / 2))
     builder.gauge((SPACING / 4, 0.0, edge / 2), name="near")
     builder.gauge((SPACING / 2, 0.0, edge / 2), name="middle")

@@ -34,15 +34,13 @@ def scene(
     positive("cell_size", cell_size)
     side = SIZE * RADIUS
     octant, ball = Box((0.0, 0.0, 0.0), (side, side, side)), Sphere((0.0, 0.0, 0.0), RADIUS)
-    around = octant - ball
 
     builder = SceneBuilder("sphere_in_air")
     builder.domain(octant.lower, octant.upper, cell_size=cell_size)
     builder.walls(Walls(x_high=Wall.OPEN, y_high=Wall.OPEN, z_high=Wall.OPEN))
     builder.ambient_pressure(ATMOSPHERE)
-    eighth = Box((0.0, 0.0, 0.0), (RADIUS, RADIUS, RADIUS)) - around
-    builder.charge(eighth, find_material("tnt"), particles_per_axis=charge_particles_per_axis, name="charge")
-    builder.charge(around, find_material("air"), particles_per_axis=particles_per_axis, name="air")
+    builder.charge(octant & ball, find_material("tnt"), particles_per_axis=charge_particles_per_axis, name="charge")
+    builder.charge(octant, find_material("air"), particles_per_axis=particles_per_axis, name="air")
     builder.detonator(PointDetonator((0.0, 0.0, 0.0)))
     diagonal = np.ones(3) / math.sqrt(3.0)
     for radii in GAUGES:

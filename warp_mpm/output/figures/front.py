@@ -31,6 +31,8 @@ def front_figure(run: Run) -> Figure:
     record = step_record(run).line
     if record is None:
         raise NothingToDrawError("the scene names neither a line nor a front_path")
+    if len(record.time) < 2:
+        raise NothingToDrawError("no step was taken yet")
     scale = pressure_scale(run)
     distance = record.distance / MILLIMETRE
     figure = new_figure((5.6, 5.6))

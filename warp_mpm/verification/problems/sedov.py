@@ -23,7 +23,6 @@ from warp_mpm.verification.fields import (
 )
 from warp_mpm.verification.problem import Bound, Curve, Level, Measurement, Problem, ladder
 from warp_mpm.verification.problems._gas import COLD, RADIUS, gas_panels
-from warp_mpm.volume import measure_volume
 
 SIZE = 1.2  # of the octant [m]
 TIME = 1.0  # [s]
@@ -58,16 +57,13 @@ class Sedov(Problem):
     def scene(self, level: Level) -> Scene:
         """The source, and the gas around it."""
         octant, ball = Box((0.0, 0.0, 0.0), (SIZE, SIZE, SIZE)), Sphere((0.0, 0.0, 0.0), SOURCE)
-        around = octant - ball
-        source = octant - around
-        volume, _ = measure_volume(source)  # as the charge will have it, so that the energy is exact
-        energy = BLAST.blast_energy / 8.0 / (BLAST.initial_density * volume)
+        energy = BLAST.blast_energy / (BLAST.initial_density * ball.exact_volume())
         gas = IdealGas(BLAST.gamma)
         builder = SceneBuilder(self.name)
         builder.domain(octant.lower, octant.upper, cell_size=SIZE / level.cells)
         hot = Material("source", BLAST.initial_density, gas, energy)
-        builder.charge(source, hot, particles_per_axis=SOURCE_PARTICLES, name="source")
-        builder.charge(around, Material("gas", BLAST.initial_density, gas, COLD), name="gas")
+        builder.charge(octant & ball, hot, particles_per_axis=SOURCE_PARTICLES, name="source")
+        builder.charge(octant, Material("gas", BLAST.initial_density, gas, COLD), name="gas")
         builder.end_time(TIME)
         return builder.build()
 
