@@ -1,6 +1,7 @@
 """The library: every explosive detonates as stated and collides as published; user materials from TOML files."""
 
 import math
+from functools import partial
 
 import pytest
 from scenes_for_tests import TNT
@@ -89,6 +90,17 @@ def test_rows_that_are_copied_wrong_are_refused(row):
             equation_of_state=mpm.JWL(row["density"], *row["law"]),
             energy=row["energy"] / row["density"],
         )
+
+
+@pytest.mark.parametrize(
+    "make", [mpm.inert, partial(mpm.explosive, detonation_speed=7000.0)], ids=["inert", "explosive"]
+)
+def test_no_energy_is_found_for_a_pressure_that_does_not_depend_on_it(make):
+    linear = mpm.MieGruneisen(density=8930.0, sound_speed=3940.0)
+    with pytest.raises(
+        mpm.InputError, match=r"^copper: equation_of_state: expected one whose pressure rises .*Gruneisen"
+    ):
+        make("copper", density=8930.0, equation_of_state=linear)
 
 
 def test_inert_materials():

@@ -16,7 +16,7 @@ from warp_mpm.kernels.burn import BurnLaw
 from warp_mpm.kernels.burn.compression import CompressionBurn
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
-from warp_mpm.kernels.eos import EquationOfState
+from warp_mpm.kernels.eos import EquationOfState, evaluate
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.kernels.numbers import is_number
 from warp_mpm.warp_startup import start_quietly
@@ -109,6 +109,7 @@ def explosive(
     _check_positive(name, "density", density, "kg/m3")
     _check_positive(name, "detonation_speed", detonation_speed, "m/s")
     start_quietly()  # the check evaluates device functions, which starts Warp
+    _check_heat(name, equation_of_state, density)
     specific_energy = _specific_energy(name, energy, equation_of_state, density, detonation_speed)
     state = chapman_jouguet_state(equation_of_state, density, specific_energy)
     speed, warnings = _matched_speed(name, density, detonation_speed, equation_of_state, state, on_mismatch)
@@ -144,6 +145,7 @@ def inert(
     _check_positive(name, "density", density, "kg/m3")
     _check_positive(name, "pressure", pressure, "Pa")
     start_quietly()
+    _check_heat(name, equation_of_state, density)
     return Material(
         name, density, equation_of_state, energy_at_pressure(equation_of_state, density, pressure), citation=citation
     )
@@ -228,6 +230,17 @@ def _matched_pressure(name: str, stated: float, state: ChapmanJouguetState, on_m
 def _check_positive(name: str, quantity: str, value: Any, unit: str) -> None:
     if not (is_number(value) and value > 0.0):
         raise checks.mistake(f"{name}: {quantity}", f"a positive finite number of {unit}", checks.shortened(value))
+
+
+def _check_heat(name: str, equation_of_state: EquationOfState, density: float) -> None:
+    """Refuse an equation of state without heat where an energy is asked of it."""
+    if not evaluate(equation_of_state, equation_of_state.pressure_slope, density) > 0.0:
+        raise checks.mistake(
+            f"{name}: equation_of_state",
+            "one whose pressure rises with its energy",
+            checks.shortened(equation_of_state),
+            "give it a Gruneisen coefficient, or make it by Material(...) with a specific_energy of your own",
+        )
 
 
 def _check_kind(name: str, equation_of_state: object, role: str = "equation_of_state") -> None:
