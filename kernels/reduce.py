@@ -118,12 +118,12 @@ def add_audit(sums: wp.array(dtype=wp.float64), lane: int, value: wp.float64):
 def audit_particles(
     particles: Particles,
     spacing: vector3,
-    initial_energy: scalar,
+    chemical_energy: scalar,
     sums: wp.array(dtype=wp.float64),
     slab: int,
     begin: int,
 ):
-    """Sum mass, momentum, energies and volume of the particles, in double."""
+    """Sum mass, momentum, energies and volume of the particles, in double; inert matter has no `chemical_energy`."""
     p = begin + wp.tid()
     motion = particles.motion[p]
     matter = particles.matter[p]
@@ -139,7 +139,7 @@ def audit_particles(
     add_audit(sums, lane + AUDIT_INTERNAL, mass * wp.float64(matter.energy))
     if particles.burn_times.shape[0] > 0:
         burnt = wp.float64(matter.burn_fraction)
-        add_audit(sums, lane + AUDIT_RELEASED, mass * burnt * wp.float64(initial_energy))
+        add_audit(sums, lane + AUDIT_RELEASED, mass * burnt * wp.float64(chemical_energy))
     add_audit(sums, lane + AUDIT_VOLUME, mass / wp.float64(matter.density))
     for axis in range(3):
         place = wp.float64(position.cell[axis]) + wp.float64(position.fraction[axis])

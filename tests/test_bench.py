@@ -281,7 +281,7 @@ def test_the_command_leaves_its_files(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--threads", "0"], "threads: expected at least 1, got 0"),
+        (["--threads", "0"], "threads: expected a whole number of at least 1, got 0"),
         (["--repeats", "0"], "--repeats: expected"),
         (["--device", "abacus"], "device: expected one of"),
         (["--sections", "speed"], "invalid choice: 'speed'"),

@@ -343,7 +343,9 @@ def test_too_many_particles_are_refused_before_they_are_made(monkeypatch):
     monkeypatch.setattr("warp_mpm.lattice.Lattice.sites_in", allocate)
     message = refusal(cube_builder().build)
     assert "particles: expected at most 8e+03 in this machine's 0 GB, got 8e+03, which need" in message
-    assert message.endswith("choose a larger cell size or fewer particles per axis")
+    assert message.endswith(
+        "choose a larger cell size or fewer particles per axis, or check the units: lengths are in metres"
+    )
 
 
 def test_memory_that_is_unknown_refuses_nothing(monkeypatch):

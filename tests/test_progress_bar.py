@@ -5,6 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
+from warp_mpm.output import progress_bar
 from warp_mpm.output.progress_bar import progress_on
 
 
@@ -39,3 +40,17 @@ def test_closing_before_the_first_update_and_twice(terminal):
     progress = progress_on(Console(file=io.StringIO(), force_terminal=terminal))
     progress.close()
     progress.close()
+
+
+def test_a_long_run_is_not_silent(monkeypatch):
+    """No time left is told from the first step alone; later a line every half minute, however far away the end is."""
+    console, now = Console(file=io.StringIO(), width=60), [0.0]
+    monkeypatch.setattr(progress_bar.wall_clock, "monotonic", lambda: now[0])
+    progress = progress_on(console)
+    for step in range(100):
+        now[0] = float(step)
+        progress.update((step + 1) * 1e-6, 1.0, step, "2.61 GPa")
+    lines = console.file.getvalue().splitlines()
+    assert len(lines) == 4
+    assert "left" not in lines[0]
+    assert lines[1].endswith("  999969 s left")  # 30 seconds for 30 of the other 999,969 microseconds

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from warp_mpm.cli import main
+
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -22,7 +24,7 @@ def test_two_commands_set_up_everything():
 
 
 def test_the_script_runs_and_its_results_are_read(tmp_path):
-    script, reading = blocks("python")
+    script, reading, _ = blocks("python")
     (tmp_path / "script.py").write_text(script + reading, encoding="utf-8")
     ended = subprocess.run(
         [sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
@@ -31,6 +33,17 @@ def test_the_script_runs_and_its_results_are_read(tmp_path):
     printed = r"p_CJ 19\.6 GPa, peak 1\d\.\d GPa\n\d+\.\d us: \d+\.\d GPa in \d+ particles\n"
     assert re.fullmatch(printed, ended.stdout)
     assert (tmp_path / "out" / "ball" / "ball.usdc").exists()
+
+
+def test_the_scene_runs_with_another_parameter(tmp_path, monkeypatch, capsys):
+    *_, scene = blocks("python")
+    (tmp_path / "my_scene.py").write_text(scene, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    words = ["run", "my_scene.py", "--set", "cell_size=2e-2", "--frames", "3", "-o", "out"]
+    assert main(words) == 0
+    printed = capsys.readouterr().out
+    assert "in_the_water" in printed
+    assert "2.0 cells across" in printed
 
 
 def test_links_lead_somewhere():

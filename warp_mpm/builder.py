@@ -8,16 +8,16 @@ import numpy as np
 
 from warp_mpm import checks
 from warp_mpm.cells import check_aspect, domain_of_cells
-from warp_mpm.charges import Body, charge_warnings, check_fit, cut_charges, fill_what_is_free
+from warp_mpm.charges import Body, check_fit, cut_charges, fill_what_is_free
 from warp_mpm.checks import mistake
 from warp_mpm.detonators import Detonator, checked
 from warp_mpm.gauges import carried_gauges
 from warp_mpm.geometry import Solid
 from warp_mpm.ignition import resolve_detonators
-from warp_mpm.lattice import Lattice
 from warp_mpm.materials import Material
 from warp_mpm.resistance import check_resistance
 from warp_mpm.scene import Domain, Gauge, Scene, SectionPlane, Segment, Vector, Walls
+from warp_mpm.scene_warnings import scene_warnings
 
 OUTSIDE_TOLERANCE = 1e-9  # of the domain's size
 NAME = r"\w[\w.-]*"  # that suits a file, and the header of a table
@@ -112,7 +112,9 @@ class SceneBuilder:
         Raises:
             InputError: not a `Walls`.
         """
-        self._walls = checks.instance(f"{self._here}: walls", walls, Walls, "a Walls")
+        self._walls = checks.instance(
+            f"{self._here}: walls", walls, Walls, "a Walls", "all faces alike: Walls.all(Wall.OPEN)"
+        )
 
     # ---- what it is, and what starts it ----------------------------------------------------------------------------
 
@@ -322,13 +324,7 @@ class SceneBuilder:
             collision_points=tuple(self._collision_points),
             picture_times=pictures,
             gauges=carried_gauges(self._here, self._gauges, domain, charges),
-            warnings=tuple(
-                dict.fromkeys(  # what charges of one material have in common is said once
-                    warning
-                    for body, charge in zip(bodies, charges, strict=True)
-                    for warning in charge_warnings(charge, Lattice(domain, body.particles_per_axis).site_volume)
-                )
-            ),
+            warnings=scene_warnings(charges, detonators, domain, end_time),
         )
 
     def _given(self, name: str, value: Given | None) -> Given:

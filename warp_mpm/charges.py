@@ -185,7 +185,7 @@ def _check_memory(where: str, particle_count: float) -> None:
             f"{where}: particles",
             f"at most {memory / BYTES_PER_PARTICLE:.2g} in this machine's {memory / 1e9:.0f} GB",
             f"{particle_count:.2g}, which need {particle_count * BYTES_PER_PARTICLE / 1e9:.0f} GB",
-            "choose a larger cell size or fewer particles per axis",
+            "choose a larger cell size or fewer particles per axis, or check the units: lengths are in metres",
         )
 
 

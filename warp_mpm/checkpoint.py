@@ -83,7 +83,9 @@ class Checkpoints:
         if unreadable:
             raise unreadable[0]
         got = "no directory" if self._directory is None else f"none in {str(self._directory)!r}"
-        raise mistake("resume", "a checkpoint to go on from", got, "unless it is complete, start anew without --resume")
+        raise mistake(
+            "resume", "a checkpoint to go on from", got, "a run that is complete has none; else start anew, without it"
+        )
 
     @contextmanager
     def must_fit(self) -> Iterator[None]:
@@ -116,7 +118,7 @@ class Checkpoints:
             raise mistake(
                 "resume",
                 f"the scene and the settings that {path.name} was made of",
-                f"another {', another '.join(others)}",
+                f"others: {', '.join(others)}",
                 "give the same again, or start anew without --resume",
             )
 

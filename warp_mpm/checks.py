@@ -127,12 +127,12 @@ def each(where: str, value: Any, length: int, check: Callable[[str, Any], Number
     return [check(where, part) for part in parts]
 
 
-def instance(where: str, value: Any, kind: Any, expected: str) -> Any:
+def instance(where: str, value: Any, kind: Any, expected: str, remedy: str = "") -> Any:
     """`value` itself.
 
     Raises:
         InputError: it is not an instance of `kind`, which the message calls `expected`.
     """
     if not isinstance(value, kind):
-        raise mistake(where, expected, shortened(value))
+        raise mistake(where, expected, shortened(value), remedy)
     return value

@@ -32,8 +32,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = _parser().parse_args(words)
         options.command(options)
+        sys.stdout.flush()
     except InputError as error:
         return _report(str(error), MISTAKE, words)
+    except BrokenPipeError:  # who read the output has seen enough: `warp-mpm list | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the flush at exit would fail again
+        return SUCCESS
     except (SimulationError, VerificationError, OSError) as error:
         return _report(str(error), FAILURE, words)
     except KeyboardInterrupt as error:

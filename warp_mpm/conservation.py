@@ -25,7 +25,7 @@ class Totals:
     absolute_momentum: float  # sum m |v|
     kinetic: float
     internal: float
-    released: float  # sum F m E0
+    released: float  # sum F m E0 of explosives
     volume: float
     position: np.ndarray  # (3,) sum m x
     grid_mass: float | None  # None where the grid still holds the instant before (USF)

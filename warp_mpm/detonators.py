@@ -169,7 +169,9 @@ def checked(where: str, detonator: object) -> Detonator:
             a radius or a speed is not positive.
     """
     names = "a PointDetonator, LineDetonator, PlaneDetonator, SphereDetonator or CordDetonator"
-    given: Detonator = checks.instance(where, detonator, Detonator, names)
+    given: Detonator = checks.instance(
+        where, detonator, Detonator, names, "of several, one argument each: detonator(*ring(...))"
+    )
     time, charges = checks.not_negative(f"{where}: time", given.time), checks.names(f"{where}: charges", given.charges)
     if isinstance(given, PointDetonator):
         booster = checks.flag(f"{where}: booster", given.booster)

@@ -23,7 +23,8 @@ from warp_mpm.warp_startup import start_quietly
 
 ROUND_OFF = 1e-5  # relative difference of two speeds that are the same: single precision, and the digits people write
 ATMOSPHERE = 101325.0  # standard pressure [Pa]
-TOLERANCE = 0.01  # relative difference that is adjusted; more is an error
+NOTABLE = 1e-3  # relative difference of a speed that is worth a warning
+TOLERANCE = 0.01  # and the largest that is adjusted; more is an error
 
 
 class OnMismatch(Enum):
@@ -206,6 +207,8 @@ def _matched_speed(
             f"{name}: runs at the stated {stated:g} m/s, but its equation of state implies {implied:.0f} m/s: "
             f"{consequence}",
         )
+    if mismatch <= NOTABLE:
+        return implied, ()
     if mismatch <= TOLERANCE:
         return implied, (
             f"{name}: runs at {implied:.1f} m/s, which its equation of state implies, not at the stated {stated:g} m/s",

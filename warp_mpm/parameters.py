@@ -58,8 +58,14 @@ def from_python(values: Mapping[str, Any], annotations: Mapping[str, Any], where
 
 def closest_match(name: str, known: Iterable[str]) -> str:
     """The remedy for a misspelt name: "did you mean ...?", or nothing when no known name is near."""
-    matches = get_close_matches(name, list(known), n=1)
-    return f"did you mean {matches[0]}?" if matches else ""
+    plain = {_plain(one): one for one in known}
+    matches = get_close_matches(_plain(name), list(plain), n=1)
+    return f"did you mean {plain[matches[0]]}?" if matches else ""
+
+
+def _plain(name: str) -> str:
+    """A name without what is easily mistaken: capitals, and signs between words."""
+    return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
 class _UnsuitableError(Exception):

@@ -115,7 +115,9 @@ class _Run:
         progress: Progress,
         resume: bool,
     ) -> None:
-        self.scene = checks.instance("simulate: scene", scene, Scene, "a Scene")
+        self.scene = checks.instance(
+            "simulate: scene", scene, Scene, "a Scene", "a SceneBuilder makes one: builder.build()"
+        )
         self.save = checks.instance("simulate: save", save, Save, "a Save")
         checks.instance("simulate: config", config, SolverConfig, "a SolverConfig")
         checks.flag("simulate: resume", resume)

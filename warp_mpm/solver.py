@@ -114,7 +114,7 @@ class Solver:
         state, model = self.state, self.model
         sums = wp.zeros(model.slab_count * reduce.AUDIT, dtype=wp.float64, device=model.device)
         for slab, charge, begin, count in self._groups():
-            energy = charge.material.specific_energy
+            energy = charge.material.specific_energy if charge.burn_class is not None else 0.0
             inputs = [state.particles, state.grid.spacing, energy, sums, slab, begin]
             wp.launch(reduce.audit_particles, count, inputs=inputs, device=model.device)
         grid_mass = wp.zeros(1, dtype=wp.float64, device=model.device)

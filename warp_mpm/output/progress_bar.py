@@ -7,7 +7,8 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from warp_mpm.progress import Progress as ProgressProtocol
 
-LINES = 10  # that a run without a terminal writes
+LINES = 10  # that a run without a terminal writes, if none of them is long in coming
+LONGEST_SILENCE = 30.0  # [s]
 MICROSECOND = 1e-6  # [s]
 
 
@@ -47,12 +48,14 @@ class ProgressBar:
 
 
 class ProgressLines:
-    """A line at the start, at every tenth of the run, and at its end."""
+    """A line at the start, at every tenth of the run or half a minute, and at its end."""
 
     def __init__(self, console: Console) -> None:
         """Lines on `console`."""
         self._console = console
-        self._started = 0.0  # [s]
+        self._started = 0.0  # by the clock on the wall, as the share of the run then [s]
+        self._started_at = 0.0
+        self._said = 0.0  # when the last line was written [s]
         self._printed = -1  # tenths of the run
 
     def message(self, text: str) -> None:
@@ -60,16 +63,17 @@ class ProgressLines:
         self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def update(self, time: float, end_time: float, step: int, note: str) -> None:
-        """Print a line if the run at `time` [s] of `end_time` [s] has entered another tenth."""
-        share = min(time / end_time, 1.0)
+        """Print a line if the run at `time` [s] of `end_time` [s] has entered another tenth, or was long silent."""
+        share, now = min(time / end_time, 1.0), wall_clock.monotonic()
         tenth = int(share * LINES)
-        if tenth == self._printed:
+        if tenth == self._printed and now - self._said < LONGEST_SILENCE:
             return
-        now = wall_clock.monotonic()
+        left = ""
         if self._printed < 0:
-            self._started = now
-        self._printed = tenth
-        left = f"  {(now - self._started) * (1.0 - share) / share:.0f} s left" if 0.0 < share < 1.0 else ""
+            self._started, self._started_at = now, share
+        elif self._started_at < share < 1.0:
+            left = f"  {(now - self._started) * (1.0 - share) / (share - self._started_at):.0f} s left"
+        self._printed, self._said = tenth, now
         self.message(f"{share:4.0%}  {_state(time, end_time, step, note)}{left}")
 
     def close(self) -> None:

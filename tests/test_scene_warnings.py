@@ -1,0 +1,82 @@
+"""What is odd about a scene, but no mistake: detonators that light nothing, explosives too small for their cells."""
+
+import subprocess
+import sys
+
+import pytest
+from scenes_for_tests import CELL, explosive
+
+from warp_mpm import materials
+from warp_mpm.builder import SceneBuilder
+from warp_mpm.detonators import PointDetonator, row
+from warp_mpm.geometry import Box, Sphere
+from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.parameters import closest_match
+from warp_mpm.scene import Scene
+
+LENGTH = 20 * CELL
+ACROSS = LENGTH / 2800.0  # time of a wave from end to end [s]
+
+
+def bar(*detonators, end_time=1.0, solid=None) -> Scene:
+    """A bar of the paper's explosive in a domain that it fills, or another solid in it."""
+    builder = SceneBuilder("bar")
+    box = Box((0.0, 0.0, 0.0), (LENGTH, CELL, CELL))
+    builder.domain(box.lower, box.upper if solid is None else (LENGTH, LENGTH, LENGTH), cell_size=CELL)
+    builder.charge(solid or box, explosive(), name="charge")
+    builder.detonator(*detonators)
+    builder.end_time(end_time)
+    return builder.build()
+
+
+def at(share, time=0.0):
+    return PointDetonator((share * LENGTH, CELL / 2, CELL / 2), time=time)
+
+
+def test_detonators_that_are_lit_in_time_are_no_matter():
+    assert bar(at(0.0), at(1.0), at(0.5, 0.49 * ACROSS)).warnings == ()
+
+
+def test_detonators_after_the_end():
+    (warning,) = bar(at(0.0), at(0.5, 3e-6), at(1.0, 2e-6), end_time=2e-6).warnings
+    assert warning.startswith("detonators 2, 3: nothing is lit before the end at 2 us;")
+
+
+def test_detonators_whose_place_has_burnt():
+    (warning,) = bar(at(0.0), at(0.5, 0.51 * ACROSS), at(1.0, 0.2 * ACROSS)).warnings
+    assert warning.startswith("detonator 2: others' waves may have passed before it is lit:")
+    many = row((0.0, CELL / 2, CELL / 2), (LENGTH, CELL / 2, CELL / 2), 5, delay=ACROSS)
+    (warning,) = bar(*many).warnings
+    assert warning.startswith("detonators 2, 3, 4, 5: ")
+
+
+@pytest.mark.parametrize(("radius", "warned"), [(2.4, True), (2.6, False)])
+def test_explosives_of_few_cells(radius, warned):
+    """A charge from wall to wall may be one cell thick, others may not."""
+    middle = (LENGTH / 2, LENGTH / 2, LENGTH / 2)
+    warnings = bar(PointDetonator(middle), solid=Sphere(middle, radius * CELL)).warnings
+    assert [warning.startswith("charge 'charge': 4.8 cells across") for warning in warnings] == [True] * warned
+
+
+def test_speeds_that_differ_in_the_fourth_digit_are_the_same():
+    gas = IdealGas(2.0)
+    energy = 2800.0**2 / 6.0  # E0 = D^2 / (2 (gamma^2 - 1))
+    for stated, warned in ((2800.0 * 1.0009, False), (2800.0 * 1.0011, True)):
+        made = materials.explosive("gas", density=1000.0, detonation_speed=stated, equation_of_state=gas, energy=energy)
+        assert bool(made.warnings) == warned
+        assert made.burn.detonation_speed == pytest.approx(2800.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(("typed", "meant"), [("TNT", "tnt"), ("C-4", "c4"), ("Composition B", "composition_b")])
+def test_capitals_and_signs_are_no_other_name(typed, meant):
+    assert closest_match(typed, ["tnt", "c4", "composition_b"]) == f"did you mean {meant}?"
+    assert closest_match("gunpowder", ["tnt", "c4"]) == ""
+
+
+def test_a_reader_who_has_seen_enough():
+    """`warp-mpm list | head -1`: the pipe is closed before all is written."""
+    command = [sys.executable, "-m", "warp_mpm", "list"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:
+        program.stdout.close()
+        said = program.stderr.read()
+    assert (program.returncode, said) == (0, b"")
