@@ -296,6 +296,7 @@ class _Run:
 
     def _history_row(self, totals: Totals, pressure: np.ndarray) -> dict[str, float]:
         clock = self.state.clock_values()
+        pressure = pressure.astype(np.float64)  # the square of an absurd one may be beyond single precision
         mean = float(pressure.mean()) if len(pressure) else 0.0
         spread = float(pressure.std()) / mean if mean > 0.0 else 0.0
         peak, sparse = self.recorder.take_peak(), sparse_share(self.state)
