@@ -67,6 +67,21 @@ def test_speeds_that_differ_in_the_fourth_digit_are_the_same():
         assert made.burn.detonation_speed == pytest.approx(2800.0, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("density", "speed", "asked"),
+    [
+        (1.63, 6930.0, "in g/cm3"),
+        (1630.0, 6.93, "in km/s"),
+        (1630.0, 6930.0, ""),
+        (0.5, 2840.0, ""),
+        (200.0, 500.0, ""),
+    ],
+)
+def test_units_are_asked_for(density, speed, asked):
+    made = materials.explosive("x", density=density, detonation_speed=speed, equation_of_state=IdealGas(3.0))
+    assert [asked in warning for warning in made.warnings] == [True] * bool(asked)
+
+
 @pytest.mark.parametrize(("typed", "meant"), [("TNT", "tnt"), ("C-4", "c4"), ("Composition B", "composition_b")])
 def test_capitals_and_signs_are_no_other_name(typed, meant):
     assert closest_match(typed, ["tnt", "c4", "composition_b"]) == f"did you mean {meant}?"

@@ -25,6 +25,9 @@ ROUND_OFF = 1e-5  # relative difference of two speeds that are the same: single 
 ATMOSPHERE = 101325.0  # standard pressure [Pa]
 NOTABLE = 1e-3  # relative difference of a speed that is worth a warning
 TOLERANCE = 0.01  # and the largest that is adjusted; more is an error
+SLOWEST = 200.0  # detonation of anything [m/s]
+DENSEST_GAS = 50.0  # that detonates [kg/m3]
+FASTEST_IN_GAS = 4500.0  # detonation [m/s]; hydrogen and oxygen come to some 3000
 
 
 class OnMismatch(Enum):
@@ -117,6 +120,7 @@ def explosive(
     if cj_pressure is not None:
         _check_positive(name, "cj_pressure", cj_pressure, "Pa")
         warnings += _matched_pressure(name, cj_pressure, state, on_mismatch)
+    warnings += _odd_units(name, density, detonation_speed)
     return Material(
         name,
         density,
@@ -218,6 +222,15 @@ def _matched_speed(
         f"{name}: detonation_speed: expected the {implied:.0f} m/s (to 1 %) that its equation of state implies with "
         f"this energy, got {stated:g}; use energy={consistent:.4g} J/kg, energy=cj, or on_mismatch=keep to run it as is"
     )
+
+
+def _odd_units(name: str, density: float, speed: float) -> tuple[str, ...]:
+    """What to ask about figures that no explosive has: gases detonate too, but not as fast, and nothing as slowly."""
+    if speed < SLOWEST:
+        return (f"{name}: a detonation speed of {speed:g} m/s: is it in km/s?",)
+    if density < DENSEST_GAS and speed > FASTEST_IN_GAS:
+        return (f"{name}: a density of {density:g} kg/m3 with a detonation speed of {speed:g} m/s: is it in g/cm3?",)
+    return ()
 
 
 def _matched_pressure(name: str, stated: float, state: ChapmanJouguetState, on_mismatch: OnMismatch) -> tuple[str, ...]:
