@@ -5,7 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from warp_mpm.cli import main
+from warp_mpm.material_files import load_materials
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -44,6 +47,15 @@ def test_the_scene_runs_with_another_parameter(tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr().out
     assert "in_the_water" in printed
     assert "2.0 cells across" in printed
+
+
+def test_the_materials_are_read(tmp_path):
+    (tables,) = blocks("toml")
+    (tmp_path / "materials.toml").write_text(tables, encoding="utf-8")
+    materials = load_materials(tmp_path / "materials.toml")
+    assert list(materials) == ["my_tnt", "brine"]
+    assert materials["my_tnt"].cj.pressure == pytest.approx(21e9, rel=0.01)
+    assert materials["brine"].burn is None
 
 
 def test_links_lead_somewhere():
