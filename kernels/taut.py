@@ -19,6 +19,7 @@ from warp_mpm.kernels.passage import (
     is_clear,
     onto_surface,
     shortened,
+    surface_at,
 )
 from warp_mpm.kernels.precision import HALF, NEVER, ONE, TWO, ZERO, matrix2, scalar, vector2, vector3, vector4
 from warp_mpm.kernels.routes import FIXED, Route
@@ -253,8 +254,9 @@ def excess(passage: Passage, medium: int, start: vector3, corner: vector3) -> sc
     """
     found = deepest(passage, medium, corner, start, scalar(1.0e30))
     longer = scalar(0.0)
-    if found[0] > ZERO and found[1] > ZERO:
-        longer = found[0] * found[0] / (found[1] * wp.length(corner - start)) * scalar(4.0 / 3.0)
+    height = surface_at(passage, medium, corner + (start - corner) * found[1]).distance
+    if height > ZERO and found[1] > ZERO:
+        longer = height * height / (found[1] * wp.length(corner - start)) * scalar(4.0 / 3.0)
     return longer
 
 
