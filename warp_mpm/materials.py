@@ -120,7 +120,6 @@ def explosive(
     if cj_pressure is not None:
         _check_positive(name, "cj_pressure", cj_pressure, "Pa")
         warnings += _matched_pressure(name, cj_pressure, state, on_mismatch)
-    warnings += _odd_units(name, density, detonation_speed)
     return Material(
         name,
         density,
@@ -128,7 +127,7 @@ def explosive(
         specific_energy,
         burn=_burn_law(burn, speed, density, state),
         cj=state,
-        warnings=warnings,
+        warnings=(*warnings, *_odd_units(name, density, detonation_speed)),
         unreacted=unreacted,
         stated_speed=detonation_speed,
         stated_pressure=cj_pressure,
