@@ -3,19 +3,24 @@
 import json
 import os
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scenes_for_tests import OPEN, block
 
 from warp_mpm import InputError, Save, load, simulate
+from warp_mpm.cli import main
 from warp_mpm.detonators import PlaneDetonator, PointDetonator
+from warp_mpm.output import figures
 from warp_mpm.output.description import description_from_json, scene_values
+from warp_mpm.output.figures import film
 from warp_mpm.output.frame import Frame, LineRecord, SectionRecord, StepRecord
 from warp_mpm.output.steps import read_steps, write_steps
 from warp_mpm.output.tables import write_summary
 from warp_mpm.output.usd import UsdWriter
 from warp_mpm.progress import Silent
+from warp_mpm.run_directory import FILMS, PICTURES
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import Result
 
@@ -174,6 +179,48 @@ def test_particles_that_left(tmp_path):
     for index in range(2):
         np.testing.assert_array_equal(run.frames[index].inside, frame(index, scene).inside)
         assert np.all((run.frames[index].pressure == 0.0) >= ~run.frames[index].inside)
+
+
+def contents(directory):
+    return {file: file.read_bytes() for file in directory.rglob("*") if file.is_file()}
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_run_of_another_scene_is_left_alone(ended, resume):
+    before = contents(ended.output)
+    other, save = replace(SCENE, name="cone"), Save(frames=2, figures=False)
+    with pytest.raises(InputError, match=r"^output: .* than 'cone', got .* of 'block'; choose another one with -o, or"):
+        simulate(other, save=save, output=ended.output, resume=resume)
+    assert contents(ended.output) == before
+
+
+def test_the_command_refuses_another_scene_in_one_line(tmp_path, capfd):
+    killed_run(tmp_path)
+    assert main(["run", "two_point", "--set", "cell_size=2e-2", "-o", str(tmp_path)]) == 2
+    output, error = capfd.readouterr()
+    assert (output, error.count("\n")) == ("", 1)
+
+
+def test_the_same_scene_again_leaves_no_old_pictures(tmp_path):
+    """Pictures that are not drawn this time go, whatever else is there stays."""
+    killed_run(tmp_path)
+    there = tmp_path / "figures"
+    there.mkdir()
+    for name in ("front.png", "field.gif", "field.mp4", "mine.png", "charge.gif"):
+        (there / name).write_bytes(b"old")
+    simulate(SCENE, save=Save(frames=2, figures=False), output=tmp_path)
+    assert sorted(os.listdir(there)) == ["charge.gif", "mine.png"]
+    assert sorted(os.listdir(tmp_path)) == ["block.usdc", "figures", "history.csv", "steps.npz", "summary.json"]
+
+
+def test_the_names_of_all_pictures_are_known():
+    assert set(PICTURES) == set(figures.PICTURES)
+    assert set(FILMS) == set(film.FILMS)
+
+
+def test_a_damaged_summary_does_not_keep_a_run_from_its_directory(tmp_path):
+    (tmp_path / "summary.json").write_text("[1")
+    assert simulate(SCENE, save=Save(frames=2, figures=False), output=tmp_path).summary["status"] == "complete"
 
 
 def test_a_run_in_the_same_place_is_not_the_old_one(tmp_path):

@@ -6,16 +6,31 @@ from pathlib import Path
 
 import numpy as np
 
+from warp_mpm.checks import mistake
 from warp_mpm.conservation import Audit
 from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.kernels.material import HUGE
 from warp_mpm.model import Model
+from warp_mpm.run_directory import scene_in
 from warp_mpm.state import State, memory_needed
 
 MOST_NODES = 2**31 - 1
 MEMORY_SHARE = 0.9  # of the free memory that a run may take
 NOTABLE_CLAMP = 1e-3  # of all energy, from which on its clamping is worth a warning
 SHORTEST_STEP = 1e-5  # of the first time step; shorter ones do not come to an end
+
+
+def check_scene_there(path: Path, scene: str) -> None:
+    """Refuse to mix the files of two scenes in one run directory; that of the same scene may be written again.
+
+    Raises:
+        InputError: a run of another scene is there.
+    """
+    there = scene_in(path)
+    if there is not None and there != scene:
+        got = f"{str(path)!r}, which holds a run of {there!r}"
+        remedy = "choose another one with -o, or remove it"
+        raise mistake("output", f"a directory without a run of another scene than {scene!r}", got, remedy)
 
 
 def writable_directory(path: Path) -> Path:

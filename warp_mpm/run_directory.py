@@ -20,6 +20,9 @@ if TYPE_CHECKING:  # the reader of frames needs pxr
 
 SUMMARY, HISTORY, STEPS, GAUGES = "summary.json", "history.csv", "steps.npz", "gauges.csv"
 FIGURES = "figures"  # directory
+PICTURES = ("charge", "particles", "field", "section", "front", "peak", "arrival", "energy", "gauges")  # `<name>.png`
+FILMS = ("field", "section")  # those of them that can also move, `<name>.gif` or `<name>.mp4`
+FILM_KINDS = ("gif", "mp4")  # as the command offers them
 
 
 def load(path: str | Path) -> "Run":
@@ -46,6 +49,24 @@ def load(path: str | Path) -> "Run":
     if not run.summary and run.file is None:
         raise mistake("load", f"a run directory, with {SUMMARY} or a USD file", f"{str(path)!r}, which has neither")
     return run
+
+
+def scene_in(directory: Path) -> str | None:
+    """The name of the scene whose run is in a directory, as its summary says; None if none says so."""
+    try:
+        summary = json.loads((directory / SUMMARY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):  # the latter also for a name that no file can have
+        return None
+    name = summary.get("scene") if isinstance(summary, dict) else None
+    return name if isinstance(name, str) else None
+
+
+def remove_results(directory: Path) -> None:
+    """Remove what an earlier run drew and wrote at its end: a run that is killed leaves neither."""
+    films = (f"{name}.{kind}" for name in FILMS for kind in FILM_KINDS)
+    for file in (*(f"{name}.png" for name in PICTURES), *films):
+        (directory / FIGURES / file).unlink(missing_ok=True)
+    (directory / STEPS).unlink(missing_ok=True)
 
 
 class Run:

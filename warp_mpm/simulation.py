@@ -17,7 +17,7 @@ from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, sparse_share, totals_of
 from warp_mpm.errors import SimulationError, Terminated
 from warp_mpm.fingerprint import fingerprints
-from warp_mpm.guards import check_memory, check_state, clamp_warnings, writable_directory
+from warp_mpm.guards import check_memory, check_scene_there, check_state, clamp_warnings, writable_directory
 from warp_mpm.isosurface import pressure_isosurface
 from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.launch import Launcher, find_device
@@ -26,7 +26,7 @@ from warp_mpm.output.description import scene_values
 from warp_mpm.output.frame import Frame, SectionPicture, StepRecord
 from warp_mpm.progress import Progress, Silent
 from warp_mpm.recorder import Recorder
-from warp_mpm.run_directory import FIGURES, STEPS, SUMMARY, load
+from warp_mpm.run_directory import FIGURES, STEPS, SUMMARY, load, remove_results
 from warp_mpm.scene import Scene, Wall
 from warp_mpm.section import section_pressure
 from warp_mpm.solver import Solver
@@ -79,8 +79,8 @@ def simulate(
         resume: go on from the last checkpoint in `output`, as if the run had never stopped.
 
     Raises:
-        InputError: unknown device, too little memory, an output directory that cannot be written, or to resume there
-            is no checkpoint, or one of something else.
+        InputError: unknown device, too little memory, an output directory that cannot be written or holds a run
+            of another scene, or to resume there is no checkpoint, or one of something else.
         SimulationError: the run cannot go on.
     """
     config, save = SolverConfig() if config is None else config, Save() if save is None else save
@@ -124,7 +124,7 @@ class _Run:
         self.progress = progress
         self.begin = time.perf_counter()  # [s]; of a resumed run, as if it had gone on all the time
         self.launcher = Launcher(find_device(device), threads)
-        self.output = None if output is None else writable_directory(Path(output))
+        self.output = None if output is None else _run_directory(Path(output), scene)
         self.model = build_model(scene, config, self.launcher.device)
         check_memory(self.model)
         self.checkpoints = Checkpoints(self.output, self._identity(config), save)
@@ -323,7 +323,7 @@ class _Run:
         if self.output is not None:
             from warp_mpm.output.tables import write_summary
 
-            (self.output / STEPS).unlink(missing_ok=True)  # of an earlier run
+            remove_results(self.output)
             write_summary(self.output / SUMMARY, {"status": "running", **self._given()})
 
     def _draw(self) -> list[str]:
@@ -384,6 +384,11 @@ class _Run:
         if self.save.frames <= self.steps + 1:
             return []
         return [f"frames: {self.save.frames} asked for, but only {self.steps} steps taken: some frames are repeated"]
+
+
+def _run_directory(path: Path, scene: Scene) -> Path:
+    check_scene_there(path, scene.name)
+    return writable_directory(path)
 
 
 def _solver_values(model: Model) -> dict[str, Any]:
