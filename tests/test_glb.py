@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 from pxr import Usd, UsdGeom, Vt
-from scenes_for_tests import OPEN, block
-from usd_frames import FRAMES, RANGE, TIMES, frame_of, written
+from scenes_for_tests import CELL, OPEN, block
+from usd_frames import FRAMES, RANGE, TIMES, arrival_of, frame_of, open_scene, written
 
 from warp_mpm.errors import InputError
 from warp_mpm.output import colormap
@@ -154,6 +154,23 @@ def test_other_surfaces_and_what_is_not_seen(run, tmp_path):
     areas = 0.5 * np.linalg.norm(sides, axis=1)
     np.testing.assert_allclose(areas[:3].sum(), 2.5 * np.sin(2 * np.pi / 5), rtol=1e-6)
     np.testing.assert_allclose(areas[4:].sum(), 1.0, rtol=1e-6)
+
+
+def test_curves_are_lines(tmp_path):
+    """Isochrones and the detonators that are curves, in their places."""
+    scene = open_scene()
+    written(tmp_path / "block.usdc", scene, arrival=arrival_of(scene)).close()
+    document, arrays = parsed(export(tmp_path, tmp_path / "block.glb", 0))
+    lines = {mesh["name"]: mesh["primitives"][0] for mesh in document["meshes"] if mesh["primitives"][0]["mode"] == 1}
+    assert set(lines) == {"isochrones", *(f"detonator_{number}" for number in (1, 2, 3, 4))}
+    cord = lines["detonator_2"]
+    places = arrays[cord["attributes"]["POSITION"]]
+    np.testing.assert_allclose(places, scene.detonators[2].points, atol=1e-8)
+    np.testing.assert_array_equal(arrays[cord["indices"]].ravel(), [0, 1, 1, 2])
+    isochrones = lines["isochrones"]
+    pairs = arrays[isochrones["indices"]].reshape(-1, 2)
+    ends = arrays[isochrones["attributes"]["POSITION"]][pairs]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max() < 2.0 * CELL  # no line from one curve to the next
 
 
 def test_it_needs_a_frame_that_is_there(run, tmp_path):

@@ -8,13 +8,14 @@ import meshio
 import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdGeom, Vt
-from scenes_for_tests import OPEN, block
-from usd_frames import FIELDS, FRAMES, RANGE, TIMES, frame_of, written
+from scenes_for_tests import CELL, OPEN, block
+from usd_frames import FIELDS, FRAMES, RANGE, TIMES, arrival_of, frame_of, open_scene, written
 
 from warp_mpm.errors import InputError, SimulationError
 from warp_mpm.output import vtk as vtk_output
 from warp_mpm.output.export import export
 from warp_mpm.output.usd import UsdWriter
+from warp_mpm.places import section_nodes
 from warp_mpm.scene import Walls
 
 
@@ -141,6 +142,31 @@ def test_a_surface_that_changes(tmp_path):
     np.testing.assert_array_equal(read.points, points)
     np.testing.assert_array_equal(read.cells_dict["triangle"], [[1, 4, 2]])
     np.testing.assert_array_equal(read.cells_dict["quad"], [[0, 1, 2, 3]])
+
+
+def test_curves_are_lines_and_do_not_change(tmp_path):
+    """Isochrones with their times, and a cord where it is in the world; once each, in no directory of frames."""
+    scene = open_scene()
+    arrival = arrival_of(scene)
+    written(tmp_path / "block.usdc", scene, arrival=arrival).close()
+    (tmp_path / "block_isochrones.pvd").write_text("of an earlier export")
+    export(tmp_path, tmp_path / "block.pvd")
+    names = {file.name for file in tmp_path.iterdir() if file.suffix in (".pvd", ".vtu")}
+    curves = {"block_isochrones.vtu", *(f"block_detonator_{number}.vtu" for number in (1, 2, 3, 4))}
+    assert names == {"block.pvd", "block_section.pvd", *curves}
+    assert {file.name.split("_")[0] for file in (tmp_path / "block_frames").iterdir()} == {"particles", "section"}
+    points, kind, pairs, data = read_by_meshio(tmp_path / "block_isochrones.vtu")
+    assert kind == "line"
+    assert set(data) == {"arrival_time"}
+    np.testing.assert_array_equal(*data["arrival_time"][pairs].T)  # no line from one curve to the next
+    corner = section_nodes(scene)[0, 0]
+    distance = np.linalg.norm(points - corner, axis=1)
+    # Linear interpolation between nodes: of a distance it errs by an eighth of a cell at most, but at the corner.
+    np.testing.assert_allclose(distance, 2800.0 * data["arrival_time"], atol=0.2 * CELL)
+    assert np.linalg.norm(np.diff(points[pairs], axis=1), axis=-1).max() < 2.0 * CELL
+    cord = read_by_meshio(tmp_path / "block_detonator_2.vtu")
+    np.testing.assert_allclose(cord[0], scene.detonators[2].points, atol=1e-8)
+    np.testing.assert_array_equal(cord[2], [[0, 1], [1, 2]])
 
 
 def test_times_rise(tmp_path):

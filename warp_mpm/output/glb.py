@@ -16,7 +16,7 @@ import numpy as np
 from pxr import UsdGeom, UsdShade
 
 from warp_mpm.checks import mistake
-from warp_mpm.output.usd_reading import checked_frame, open_run
+from warp_mpm.output.usd_reading import checked_frame, open_run, segments_of
 from warp_mpm.output.whole_file import whole_file
 from warp_mpm.version import VERSION
 
@@ -25,7 +25,7 @@ JSON_CHUNK, BINARY_CHUNK = b"JSON", b"BIN\0"
 ALIGNMENT = 4  # of chunks and of arrays [bytes]
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 COMPONENT_TYPES = {np.dtype(np.float32): 5126, np.dtype(np.uint32): 5125}
-POINTS, TRIANGLES = 0, 4  # modes of a primitive
+POINTS, LINES, TRIANGLES = 0, 1, 4  # modes of a primitive
 Z_TO_Y = (-(0.5**0.5), 0.0, 0.0, 0.5**0.5)  # a quarter turn about x, as a quaternion (x, y, z, w)
 
 # What glows shows its colours as they are, anything else in the light of the page.
@@ -37,7 +37,7 @@ MATERIALS: dict[str, dict[str, Any]] = {
 
 
 def write_glb(source: str | Path, target: str | Path, frame: int | None) -> Path:
-    """Write a frame of a run: particles as points, the section and further surfaces as triangles.
+    """Write a frame of a run: particles as points, the section and further surfaces as triangles, curves as lines.
 
     Particles that have left through an open face are left out.
 
@@ -80,12 +80,13 @@ class _Document:
     views: list[dict[str, Any]] = field(default_factory=list)
     binary: bytearray = field(default_factory=bytearray)
 
-    def add_mesh(self, name: str, material: str, attributes: dict[str, int], corners: int | None) -> None:
-        """A mesh of one primitive, made of accessors, and the node that shows it: points, or triangles with corners."""
+    def add_mesh(
+        self, name: str, material: str, mode: int, attributes: dict[str, int], indices: dict[str, int]
+    ) -> None:
+        """A mesh of one primitive, made of accessors, and the node that shows it."""
         if material not in self.materials:
             self.materials.append(material)
-        primitive = {"material": self.materials.index(material), "attributes": attributes}
-        primitive |= {"mode": POINTS} if corners is None else {"mode": TRIANGLES, "indices": corners}
+        primitive = {"material": self.materials.index(material), "mode": mode, "attributes": attributes, **indices}
         self.nodes.append({"name": name, "mesh": len(self.meshes)})
         self.meshes.append({"name": name, "primitives": [primitive]})
 
@@ -129,24 +130,27 @@ def _chunk(kind: bytes, data: bytes, filler: bytes) -> bytes:
 
 
 def _add_shape(document: _Document, shape: Any, frame: int) -> None:
-    """Add particles or a mesh as they are in a frame, unless there is nothing left of them."""
+    """Add particles, curves or a mesh as they are in a frame, unless there is nothing left of them."""
     prim = shape.GetPrim()
     position = _array(shape.GetPointsAttr(), frame, np.float32).reshape(-1, 3)
     color = np.empty((len(position), 3), dtype=np.float32)
     color[:] = np.array(UsdGeom.PrimvarsAPI(prim).GetPrimvar("displayColor").ComputeFlattened(frame))
-    triangles = None
+    mode, corners = POINTS, np.empty(0, dtype=np.uint32)
     if prim.IsA(UsdGeom.Points):
         inside = _array(UsdGeom.Points(prim).GetWidthsAttr(), frame, np.float32) > 0.0
         position, color = position[inside], color[inside]
+    elif prim.IsA(UsdGeom.BasisCurves):
+        position, segments = segments_of(UsdGeom.BasisCurves(prim), frame)
+        mode, corners = LINES, segments.astype(np.uint32).ravel()
     else:
-        triangles = _triangles(UsdGeom.Mesh(prim), frame)
-    if len(position) == 0 or (triangles is not None and len(triangles) == 0):
+        mode, corners = TRIANGLES, _triangles(UsdGeom.Mesh(prim), frame)
+    if len(position) == 0 or (mode != POINTS and len(corners) == 0):
         return
     limits = {"min": position.min(axis=0).tolist(), "max": position.max(axis=0).tolist()}
     attributes = {"POSITION": document.add_array(position, **limits), "COLOR_0": document.add_array(color)}
-    corners = None if triangles is None else document.add_array(triangles, ELEMENT_ARRAY_BUFFER)
+    indices = {} if mode == POINTS else {"indices": document.add_array(corners, ELEMENT_ARRAY_BUFFER)}
     bound, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
-    document.add_mesh(prim.GetName(), "glowing" if bound else "lit", attributes, corners)
+    document.add_mesh(prim.GetName(), "glowing" if bound else "lit", mode, attributes, indices)
 
 
 def _triangles(mesh: Any, frame: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pxr import Tf, Usd
 
 from warp_mpm.checks import mistake
@@ -80,6 +81,20 @@ def frame_times(stage: Any) -> list[float]:
     if not time or not time.HasValue() or not time.GetTimeSamples():
         return []
     return [time.Get(code) for code in range(round(stage.GetEndTimeCode()) + 1)]
+
+
+def segments_of(curves: Any, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    """The points (n, 3) float32 [m] of linear curves, where they are in the world, and the pairs (m, 2) to be joined.
+
+    Args:
+        curves: a UsdGeom.BasisCurves, with one polyline or several.
+        frame: the time code.
+    """
+    counts = np.asarray(curves.GetCurveVertexCountsAttr().Get(frame) or (), dtype=np.int64)
+    points = np.asarray(curves.GetPointsAttr().Get(frame) or (), dtype=np.float64).reshape(-1, 3)
+    to_world = np.asarray(curves.ComputeLocalToWorldTransform(frame))  # for rows
+    start = np.delete(np.arange(len(points)), np.cumsum(counts) - 1)  # all but the last of each polyline
+    return (points @ to_world[:3, :3] + to_world[3, :3]).astype(np.float32), np.stack([start, start + 1], axis=1)
 
 
 def _why(error: Exception) -> str:

@@ -3,6 +3,7 @@
     <name>.pvd              plays the particles: pressure [Pa], further fields, and their ids
     <name>_section.pvd      plays the section plane: pressure [Pa]; one such file for every further surface
     <name>_frames/*.vtu     a file for each frame of each of them
+    <name>_isochrones.vtu   curves, which do not change in time: arrival_time [s]; so for every set of them
 
 The data come from the run's USD file, so the solver is not needed. A .pvd is written when its frames are there.
 """
@@ -16,7 +17,7 @@ import meshio
 import numpy as np
 from pxr import UsdGeom
 
-from warp_mpm.output.usd_reading import checked_frame, open_run
+from warp_mpm.output.usd_reading import checked_frame, open_run, segments_of
 from warp_mpm.output.whole_file import whole_file, write_error
 
 PLAIN = "particles"  # the shape whose .pvd has no more than the name
@@ -47,15 +48,19 @@ def write_pvd(source: str | Path, target: str | Path, frame: int | None = None) 
     frames = path.with_name(f"{path.stem}_frames")
     shapes = [UsdGeom.PointBased(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.PointBased)]
     names = [shape.GetPrim().GetName() for shape in shapes]
-    series = [path if name == PLAIN else path.with_name(f"{path.stem}_{name}.pvd") for name in names]
+    targets = [path if name == PLAIN else path.with_name(f"{path.stem}_{name}.pvd") for name in names]
     try:
         frames.mkdir(parents=True, exist_ok=True)
-        for old in [*series, *(old for name in names for old in frames.glob(f"{name}_*.vtu"))]:
-            old.unlink(missing_ok=True)
+        for name, collection in zip(names, targets, strict=True):
+            for old in (collection, collection.with_suffix(".vtu"), *frames.glob(f"{name}_*.vtu")):
+                old.unlink(missing_ok=True)
     except OSError as error:
         raise write_error(path, error) from error
-    for shape, name, collection in zip(shapes, names, series, strict=True):
-        _write_collection(collection, frames, name, rising, shape)
+    for shape, name, collection in zip(shapes, names, targets, strict=True):
+        if shape.GetPrim().IsA(UsdGeom.BasisCurves):
+            _write_mesh(collection.with_suffix(".vtu"), _curves(UsdGeom.BasisCurves(shape.GetPrim()), codes[0]))
+        else:
+            _write_collection(collection, frames, name, rising, shape)
     return path
 
 
@@ -64,9 +69,7 @@ def _write_collection(path: Path, frames: Path, name: str, times: Mapping[int, f
     lines = []
     for code, time in times.items():
         file = frames / f"{name}_{code:05d}.vtu"
-        with whole_file(file) as part:
-            # Not compressed: packing takes longer than all the rest, and a disk is large.
-            meshio.vtu.write(part, _mesh(shape, code), compression=None)
+        _write_mesh(file, _mesh(shape, code))
         lines.append(f'<DataSet timestep="{time!r}" file={quoteattr(f"{frames.name}/{file.name}")}/>')
     text = "\n".join(
         [
@@ -80,6 +83,18 @@ def _write_collection(path: Path, frames: Path, name: str, times: Mapping[int, f
     )
     with whole_file(path) as part:
         part.write_text(f"{text}\n", encoding="utf-8")
+
+
+def _write_mesh(path: Path, mesh: meshio.Mesh) -> None:
+    with whole_file(path) as part:
+        # Not compressed: packing takes longer than all the rest, and a disk is large.
+        meshio.vtu.write(part, mesh, compression=None)
+
+
+def _curves(curves: Any, code: int) -> meshio.Mesh:
+    """Polylines as cells of two points each, which every reader knows."""
+    points, segments = segments_of(curves, code)
+    return meshio.Mesh(points, [("line", segments.astype(np.int32))], dict(_vertex_data(curves, code, len(points))))
 
 
 def _mesh(shape: Any, code: int) -> meshio.Mesh:
