@@ -50,7 +50,7 @@ def scene(
     builder.charge(solid, explosive, particles_per_axis=particles_per_axis, name="body")
     builder.detonator(PointDetonator(tuple(first)))
     builder.line(first, last)
-    builder.section(2, float(first[2]))
+    builder.section(2, _middle_height(solid))
     builder.gauge(last, name="opposite", moving=True)
     builder.end_time(end_time)
     builder.picture_times(end_time * part / PICTURES for part in range(1, PICTURES + 1))
@@ -67,6 +67,19 @@ def write_ring(path: str | Path) -> None:
     c = np.roll(b, -1, axis=1)
     faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
     meshio.write(path, meshio.Mesh(points, {"triangle": faces}), file_format="stl", binary=True)
+
+
+def _middle_height(solid: Mesh) -> float:
+    """Half-way up the mesh, or where nothing is there half-way up its tallest part [m]: the section cuts matter."""
+    heights = solid.vertices[solid.faces][..., 2]
+    order = np.argsort(heights.min(axis=1))
+    lower, reach = heights.min(axis=1)[order], np.maximum.accumulate(heights.max(axis=1)[order])
+    above_gap = np.flatnonzero(lower[1:] > reach[:-1]) + 1  # the first faces of parts that have nothing below them
+    begins, ends = lower[[0, *above_gap]], reach[[*(above_gap - 1), -1]]
+    middle = 0.5 * (begins[0] + ends[-1])
+    tallest = int(np.argmax(ends - begins))
+    inside = np.any((begins < middle) & (middle < ends))
+    return float(middle if inside else 0.5 * (begins[tallest] + ends[tallest]))
 
 
 def _ring(unit: str) -> Mesh:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from warp_mpm.config import Save
 from warp_mpm.detonators import PointDetonator
@@ -39,3 +40,31 @@ def test_from_mesh_takes_any_mesh(tmp_path):
     assert scene.mass == pytest.approx(1000.0 * load_scene("from_mesh", cell_size=8e-3).mass)
     with pytest.raises(InputError, match=r"scene from_mesh: mesh 'none.stl': expected a file that can be read, got no"):
         load_scene("from_mesh", mesh="none.stl")
+
+
+def stl(path, *bodies):
+    """Solids of revolution about the z axis, of 24 steps, from profiles of (radius, height) [mm]; returns the path."""
+    meshes = [trimesh.creation.revolve(np.array(profile), sections=24) for profile in bodies]
+    trimesh.util.concatenate(meshes).export(path)
+    return str(path)
+
+
+CONE = ((0.0, 0.0), (40.0, 0.0), (0.0, 60.0))
+DISK = ((0.0, 80.0), (40.0, 80.0), (40.0, 100.0), (0.0, 100.0))
+LOW = ((0.0, 0.0), (40.0, 0.0), (40.0, 10.0), (0.0, 10.0))
+
+
+@pytest.mark.parametrize(
+    ("bodies", "height"), [((CONE,), 0.03), ((LOW, DISK), 0.09), ((CONE, DISK), 0.05)], ids=["cone", "gap", "apart"]
+)
+def test_the_section_cuts_matter(tmp_path, bodies, height):
+    """A flat base is no place for it: half-way up, or where nothing is there through the tallest part."""
+    scene = load_scene("from_mesh", mesh=stl(tmp_path / "part.stl", *bodies), cell_size=5e-3)
+    assert scene.section.axis == 2
+    assert scene.section.coordinate == pytest.approx(height, abs=1e-6)  # an STL file is in single precision
+    layer = np.abs(scene.charges[0].positions[:, 2] - height) < 5e-3
+    assert layer.any()
+
+
+def test_the_shipped_ring_is_cut_in_the_middle():
+    assert load_scene("from_mesh", cell_size=8e-3).section.coordinate == 0.0

@@ -40,31 +40,41 @@ def particles_figure(run: Run) -> Figure:
 def _draw_detail(axes: Axes, run: Run) -> None:
     """Cells as a grid, particles as dots: those in the layer of cells that the section plane is in."""
     setup = setup_of(run)
-    in_plane, normal = setup.section.in_plane, setup.section.axis
-    centre, half = _place(run), 0.5 * ZOOM * min(setup.domain.spacing)
+    in_plane = setup.section.in_plane
+    position, half = _in_section(run), 0.5 * ZOOM * min(setup.domain.spacing)
+    centre = _place(run, position)
     window = [(centre[axis] + side * half) / MILLIMETRE for axis in in_plane for side in (-1.0, 1.0)]
     for axis, draw in zip(in_plane, (axes.axvline, axes.axhline), strict=True):
         for node in node_places(setup.domain, axis):
             draw(node, color="0.75", linewidth=0.6)
-    position = run.frames[0].position
-    layer = np.floor((position[:, normal] - setup.domain.lower[normal]) / setup.domain.spacing[normal])
-    wanted = (setup.section.coordinate - setup.domain.lower[normal]) / setup.domain.spacing[normal]
-    shown = position[layer == min(int(wanted), setup.domain.cells[normal] - 1)]
-    shown = shown[np.all(np.abs(shown[:, in_plane] - centre[list(in_plane)]) <= 1.2 * half, axis=1)]
+    shown = position[np.all(np.abs(position[:, in_plane] - centre[list(in_plane)]) <= 1.2 * half, axis=1)]
     axes.plot(*(shown[:, axis] / MILLIMETRE for axis in in_plane), "o", markersize=4.0, color=SERIES[0])
     left, right, bottom, top = window
     set_window(axes, (left, right, bottom, top))
     draw_detonators(axes, setup)
 
 
-def _place(run: Run) -> np.ndarray:
-    """The middle of the detail (3,) [m]: at the first detonator, moved so that the charges fill it."""
+def _in_section(run: Run) -> np.ndarray:
+    """The particles (n, 3) [m] in the layer of cells that the section plane is in."""
+    setup, position = setup_of(run), run.frames[0].position
+    normal = setup.section.axis
+    layer = np.floor((position[:, normal] - setup.domain.lower[normal]) / setup.domain.spacing[normal])
+    wanted = (setup.section.coordinate - setup.domain.lower[normal]) / setup.domain.spacing[normal]
+    return position[layer == min(int(wanted), setup.domain.cells[normal] - 1)]
+
+
+def _place(run: Run, position: np.ndarray) -> np.ndarray:
+    """The middle of the detail (3,) [m]: near the first detonator, where particles (n, 3) [m] fill it."""
     setup, (lower, upper) = setup_of(run), charge_box(run)
+    if len(position):
+        lower, upper = position.min(axis=0), position.max(axis=0)
     wanted = setup.detonators[0].position if setup.detonators else lower
     half = 0.4 * ZOOM * min(setup.domain.spacing)
-    return np.clip(
-        wanted, np.minimum(lower + half, 0.5 * (lower + upper)), np.maximum(upper - half, 0.5 * (lower + upper))
-    )
+    middle = 0.5 * (lower + upper)
+    place = np.clip(wanted, np.minimum(lower + half, middle), np.maximum(upper - half, middle))
+    in_plane = list(setup.section.in_plane)
+    away = np.abs(position[:, in_plane] - place[in_plane]).max(axis=1)
+    return position[np.argmin(away)] if len(away) and away.min() > half else place
 
 
 def _words(run: Run) -> str:
