@@ -282,24 +282,30 @@ def test_the_field_is_the_surface_at_the_frames_nearest_to_the_instants(plate):
     assert {axes.collections[0].get_clim() for axes in panels} == {tuple(p / GPA for p in pressure_range(plate))}
 
 
-def test_colors_are_logarithmic_where_an_instant_would_be_dark(scene, tmp_path):
-    """From zero while the weakest of the instants has 1/200 of the strongest, else from 1/30 of the weakest."""
+def test_colors_are_logarithmic_where_instants_would_be_dark(scene, tmp_path):
+    """From zero while less than a third of the instants are dark, else from 1/30 of the weakest, over five decades."""
     nodes = [scene.domain.cells[axis] + 1 for axis in scene.section.in_plane]
 
-    def scale_of(weakest):
-        pictures = [SectionPicture(time, np.full(nodes, value)) for time, value in ((1e-6, GPA), (2e-6, weakest))]
+    def scale_of(*highest):
+        pictures = [SectionPicture(1e-6 * (n + 1), np.full(nodes, value)) for n, value in enumerate(highest)]
         run = left_by(tmp_path, scene, pictures=pictures)
         image = panels_of(section_figure(run))[0].images[0]
         assert image.norm.vmax == pytest.approx(pressure_range(run)[1] / GPA) == 1.0
         return image.norm, faint_pressure(run)
 
-    even, faint = scale_of(GPA / 199.0)
-    assert not isinstance(even, LogNorm)
-    assert (even.vmin, faint) == (0.0, 0.02 * GPA)
-    wide, faint = scale_of(GPA / 1000.0)
-    assert isinstance(wide, LogNorm)
-    assert wide.vmin == pytest.approx(1e-3 / 30.0)
-    assert faint == pytest.approx(1e-3 / 30.0 * GPA)
+    for linear in ((GPA, GPA / 7.9), (GPA, GPA, GPA, GPA / 1000.0), (GPA, 0.0, 0.0)):  # before the wave comes too
+        norm, faint = scale_of(*linear)
+        assert not isinstance(norm, LogNorm)
+        assert (norm.vmin, faint) == (0.0, 0.02 * GPA)
+    for highest, first in (
+        ((GPA, GPA, GPA / 8.1), 1.0 / 8.1 / 30.0),
+        ((GPA, GPA / 1e3), 1e-3 / 30.0),
+        ((GPA, 1.0), 1e-5),
+    ):
+        norm, faint = scale_of(*highest)
+        assert isinstance(norm, LogNorm)
+        assert norm.vmin == pytest.approx(first)
+        assert faint == pytest.approx(first * GPA)
 
 
 def test_peak_map_is_in_multiples_of_cj(plate):

@@ -16,8 +16,10 @@ from warp_mpm.run_directory import SUMMARY, Run
 COLOR_LIMIT = 1.6  # of p_CJ: brief focusing in a corner would otherwise leave the fronts dark; as in the USD file
 FAINT = 0.02  # share of the range of colours below which gas is not worth showing
 BRIGHTEST_SHARE = 0.003  # of an instant's values that may lie above the last colour
-WIDE = 200.0  # the last colour over the highest pressure of an instant, from which on colours are logarithmic
-BELOW = 30.0  # that pressure over the first colour then
+DARK = 8.0  # the last colour over the highest pressure of an instant that is dark: the map is nearly black there
+DARK_SHARE = 1 / 3  # of the instants that may not be dark: then colours are logarithmic
+BELOW = 30.0  # the highest pressure of the weakest instant over the first colour then
+SPAN = 1e5  # the last colour over the first then, at most: gas that has left leaves next to nothing
 
 
 def setup_of(run: Run) -> SceneDescription:
@@ -95,17 +97,19 @@ def pressure_range(run: Run) -> tuple[float, float]:
 
 
 def pressure_scale(run: Run) -> Normalize:
-    """The scale of colours for pressures in GPa: from zero, or logarithmic where that would leave an instant dark.
+    """The scale of colours for pressures in GPa: from zero, or logarithmic where that would leave many instants dark.
 
-    A shock in air has a thousandth of the pressure of the charge that it came from.
+    A shock in water soon has a twentieth of the pressure of the charge that it came from, one in air a thousandth.
     """
     lower, upper = pressure_range(run)
     shown = section_pictures(run) if run.pictures or run.file is not None else ()
-    highest = [float(np.quantile(picture.pressure, 1.0 - BRIGHTEST_SHARE)) for picture in shown]
-    weakest = min((value for value in highest if value > 0.0), default=upper)
-    if weakest * WIDE >= upper:
+    quantiles = (float(np.quantile(picture.pressure, 1.0 - BRIGHTEST_SHARE)) for picture in shown)
+    highest = [value for value in quantiles if value > 0.0]
+    dark = [value for value in highest if DARK * value < upper]
+    if not dark or len(dark) < DARK_SHARE * len(highest):
         return Normalize(lower / GIGAPASCAL, upper / GIGAPASCAL)
-    return LogNorm(weakest / BELOW / GIGAPASCAL, upper / GIGAPASCAL, clip=True)
+    first = max(min(dark) / BELOW, upper / SPAN)
+    return LogNorm(first / GIGAPASCAL, upper / GIGAPASCAL, clip=True)
 
 
 def faint_pressure(run: Run) -> float:
