@@ -4,7 +4,7 @@ import numpy as np
 
 from warp_mpm.config import Save
 from warp_mpm.output.description import scene_values
-from warp_mpm.output.frame import Frame, SectionRecord, StepRecord
+from warp_mpm.output.frame import Frame, LineRecord, SectionPicture, SectionRecord, StepRecord
 from warp_mpm.output.steps import write_steps
 from warp_mpm.output.tables import TableWriter, write_summary
 from warp_mpm.output.usd import UsdWriter
@@ -42,6 +42,23 @@ def left_by(directory, scene: Scene, *, pictures=(), line=None, history=(), fram
             for frame in frames:
                 usd.write(frame)
     return load(directory)
+
+
+def pictures_of(scene: Scene, count: int = 6) -> list[SectionPicture]:
+    """Bright in the corner where both axes of the section end, and brighter with time."""
+    u, v = (np.linspace(0, 1, scene.domain.cells[axis] + 1) for axis in scene.section.in_plane)
+    shape = (u[:, None] * v[None, :]).astype(np.float32)
+    return [SectionPicture((k + 1) * 1e-6, shape * (k + 1) * np.float32(GPA)) for k in range(count)]
+
+
+def record_of(scene: Scene) -> LineRecord:
+    """Zero before, one gigapascal after the first front has come, with uneven steps."""
+    time = np.linspace(0.0, 1.0, 80) ** 1.5 * scene.end_time
+    points = scene.line.points(60)
+    distance = np.linalg.norm(points - points[0], axis=1)
+    away = [d.time + np.linalg.norm(points - d.position, axis=1) / 2800.0 for d in scene.detonators]
+    expected = np.min(away, axis=0)
+    return LineRecord(time, distance, expected, (time[:, None] > expected).astype(np.float32) * np.float32(GPA))
 
 
 def first_frame(scene: Scene) -> Frame:

@@ -16,8 +16,8 @@ from warp_mpm.run_directory import SUMMARY, Run
 COLOR_LIMIT = 1.6  # of p_CJ: brief focusing in a corner would otherwise leave the fronts dark; as in the USD file
 FAINT = 0.02  # share of the range of colours below which gas is not worth showing
 BRIGHTEST_SHARE = 0.003  # of an instant's values that may lie above the last colour
-DARK = 8.0  # the last colour over the highest pressure of an instant that is dark: the map is nearly black there
-DARK_SHARE = 1 / 3  # of the instants that may not be dark: then colours are logarithmic
+DARK = 6.0  # the last colour over the highest pressure of an instant that is dark: the map is nearly black there
+DARK_SHARE = 0.5  # of the instants that are dark, from which on colours are logarithmic
 BELOW = 30.0  # the highest pressure of the weakest instant over the first colour then
 SPAN = 1e5  # the last colour over the first then, at most: gas that has left leaves next to nothing
 
@@ -97,7 +97,7 @@ def pressure_range(run: Run) -> tuple[float, float]:
 
 
 def pressure_scale(run: Run) -> Normalize:
-    """The scale of colours for pressures in GPa: from zero, or logarithmic where that would leave many instants dark.
+    """The scale of colours for pressures in GPa: from zero; logarithmic where half of the instants would be dark.
 
     A shock in water soon has a twentieth of the pressure of the charge that it came from, one in air a thousandth.
     """

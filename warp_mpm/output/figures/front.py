@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from warp_mpm.output import colormap
 from warp_mpm.output.figures.content import cj_pressure, pressure_scale, step_record
@@ -20,6 +21,8 @@ from warp_mpm.output.figures.style import (
 )
 from warp_mpm.output.frame import LineRecord
 from warp_mpm.run_directory import Run
+
+DECADE = 10.0  # with less, a logarithmic axis has hardly a power of ten to be labelled
 
 
 def front_figure(run: Run) -> Figure:
@@ -50,15 +53,23 @@ def front_figure(run: Run) -> Figure:
     _draw_fronts(axes, run, record)
     axes.set_xlabel("distance along the line [mm]")
     axes.set_ylabel("time [µs]")
-    peak.plot(distance, record.pressure.max(axis=0) / GIGAPASCAL, color=SERIES[0])
-    peak.set_ylabel("peak [GPa]")
-    draw_cj_line(peak, cj_pressure(run))
-    if isinstance(scale, LogNorm):
-        peak.set_yscale("log")
-    else:
-        peak.set_ylim(bottom=0.0)
+    _draw_peak(peak, record, cj_pressure(run), isinstance(scale, LogNorm))
     draw_pressure_bar(figure, image, axes, cj_pressure(run), shrink=1.0)
     return figure
+
+
+def _draw_peak(axes: Axes, record: LineRecord, reference: float | None, logarithmic: bool) -> None:
+    """The highest pressure at each point of the line; from zero where less than a decade is shown, if asked or not."""
+    highest = record.pressure.max(axis=0)
+    axes.plot(record.distance / MILLIMETRE, highest / GIGAPASCAL, color=SERIES[0])
+    axes.set_ylabel("peak [GPa]")
+    draw_cj_line(axes, reference)
+    lowest = float(highest.min(where=highest > 0.0, initial=np.inf))
+    if logarithmic and max(float(highest.max()), reference or 0.0) > DECADE * lowest:
+        axes.set_yscale("log")
+        axes.yaxis.set_minor_formatter(NullFormatter())  # between powers of ten labels would overlap
+    else:
+        axes.set_ylim(bottom=0.0)
 
 
 def _even_times(record: LineRecord, rows: int = 1000) -> tuple[np.ndarray, np.ndarray]:

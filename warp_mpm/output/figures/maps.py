@@ -8,6 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.legend_handler import HandlerTuple
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from warp_mpm.output import colormap
@@ -89,13 +92,17 @@ def arrival_figure(run: Run) -> Figure:
     figure, axes = _map(run, came)
     image = _draw_values(axes, run, arrival, cmap=_arrival_colors(), vmin=0.0, vmax=last)
     levels = MaxNLocator(ISOCHRONES, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, last)[1:]
+    marks = {}
     if np.isfinite(expected).any():
         _draw_lines(axes, setup, expected, levels, colors="white", linewidths=1.8)
-        axes.plot([], [], color="0.8", linewidth=1.8, label="expected (white)")
+        marks["expected"] = Line2D([], [], color="white", linewidth=1.8)
     lines = _draw_lines(axes, setup, arrival, levels, colors="black", linewidths=0.8)
-    axes.plot([], [], color="black", linewidth=0.8, label="computed")
+    marks["computed"] = Line2D([], [], color="black", linewidth=0.8)
     axes.clabel(lines, fontsize=7.0, fmt="%g")
-    figure.legend(loc="outside upper center", ncols=2)
+    ground = Patch(color=_arrival_colors()(0.3))  # white does not show on a page
+    handles: list[Any] = [(ground, line) for line in marks.values()]
+    handlers = {tuple: HandlerTuple(ndivide=1)}
+    figure.legend(handles, list(marks), loc="outside upper center", ncols=2, handler_map=handlers)
     _draw_bar(figure, axes, image, "arrival of the front [µs]")
     return figure
 
