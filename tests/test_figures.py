@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LogNorm, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.lines import Line2D
@@ -14,12 +14,16 @@ from matplotlib.patches import Patch
 from runs_for_tests import GAUGES, GPA, first_frame, left_by, pictures_of, record_of, run_of
 from scenes_for_tests import OPEN, block
 
+from warp_mpm.builder import SceneBuilder
 from warp_mpm.config import Save
-from warp_mpm.detonators import CordDetonator, LineDetonator, SphereDetonator
+from warp_mpm.detonators import CordDetonator, LineDetonator, PointDetonator, SphereDetonator
 from warp_mpm.errors import InputError, SimulationError
+from warp_mpm.geometry import Box
+from warp_mpm.material_library import find_material
+from warp_mpm.materials import ammonium_nitrate
 from warp_mpm.output.description import scene_values
 from warp_mpm.output.figures import PICTURES, draw_figures
-from warp_mpm.output.figures.charge import charge_figure
+from warp_mpm.output.figures.charge import TINTS, charge_figure
 from warp_mpm.output.figures.content import faint_pressure, pressure_range
 from warp_mpm.output.figures.energy import energy_figure
 from warp_mpm.output.figures.field import field_figure
@@ -292,6 +296,34 @@ def test_charge_figure_names_sizes_and_times(scene, tmp_path):
     texts = {text.get_text() for text in figure.axes[0].texts}
     assert {"200 mm", "400 mm", "20 mm", "1: 0 µs", "4: 1.5 µs", "6: 2.5 µs"} <= texts
     assert any("ammonium nitrate, 1.6 kg" in text and "its faces: all slip" in text for text in texts)
+
+
+@pytest.mark.parametrize("outer", ["water", "ammonium nitrate"])
+def test_explosive_inside_something_inert_is_seen(tmp_path, outer):
+    """The water before its middle is cut away, so that three sides of it are seen; an explosive is not cut."""
+    builder = SceneBuilder("core")
+    builder.domain((0.0, 0.0, 0.0), (0.06, 0.06, 0.06), cell_size=0.01)
+    core = Box((0.02, 0.02, 0.02), (0.04, 0.04, 0.04))
+    material = find_material(outer) if outer == "water" else ammonium_nitrate()
+    builder.charge(core, ammonium_nitrate(), name="core")
+    builder.charge(Box((0.0, 0.0, 0.0), (0.06, 0.06, 0.06)) - core, material, name="around")
+    builder.detonator(PointDetonator((0.03, 0.03, 0.03)))
+    builder.end_time(1e-5)
+    scene = builder.build()
+    figure = charge_figure(left_by(tmp_path, scene, frames=[first_frame(scene)]))
+    colors = np.unique(figure.axes[0].collections[0].get_facecolors()[:, :3], axis=0)
+    core_tint = np.array(to_rgb(TINTS[0]))
+    seen = [color for color in colors if np.allclose(color / core_tint, (color / core_tint)[0])]
+    assert len(seen) == (3 if outer == "water" else 0)
+
+
+def test_of_many_detonators_the_first_and_the_last_have_their_times(tmp_path):
+    points = tuple(PointDetonator((0.005 + 0.01 * (n % 6), 0.005 + 0.01 * (n // 6), 0.0), 1e-6 * n) for n in range(36))
+    scene = block((6, 6, 1), detonators=points)
+    figure = charge_figure(left_by(tmp_path, scene, frames=[first_frame(scene)]))
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    assert [text for text in texts if "µs" in text] == ["1: 0 µs", "36: 35 µs"]
+    assert len([text for text in texts if text.isdigit()]) == 17  # every other one
 
 
 def test_particles_figure_shows_the_particles_of_some_cells(scene, tmp_path):

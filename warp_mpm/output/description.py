@@ -89,6 +89,7 @@ def _charge_values(charge: Charge) -> dict[str, Any]:
     return {
         "name": charge.name,
         "material": charge.material.name,
+        "explosive": charge.material.burn is not None,
         "lower_m": lower,
         "upper_m": upper,
         "particles": len(charge.positions),

@@ -50,10 +50,8 @@ def charge_cells(run: Run) -> list[Cells]:
 
 
 def joined(parts: list[Cells]) -> tuple[Cells, np.ndarray]:
-    """All cells of some parts, and the number of the part (nx, ny, nz) that each is of."""
-    owner = np.zeros(parts[0].filled.shape, dtype=int)
-    for number, part in enumerate(parts):
-        owner[part.filled] = number
+    """All cells of some parts, and the number of the part (nx, ny, nz) that fills the most of each."""
+    owner = np.argmax([np.where(part.filled, part.share, 0.0) for part in parts], axis=0)
     return replace(parts[0], filled=np.any([part.filled for part in parts], axis=0)), owner
 
 

@@ -1,12 +1,17 @@
 """The charges at the start, their sizes, and the detonators."""
 
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from warp_mpm.detonators import PlaneDetonator
-from warp_mpm.output.figures.cells import charge_cells, joined
+from warp_mpm.output.figures.cells import Cells, charge_cells, joined
 from warp_mpm.output.figures.content import charge_box, cj_pressure, setup_of
 from warp_mpm.output.figures.space import (
     corners_of,
@@ -19,13 +24,14 @@ from warp_mpm.output.figures.space import (
     window_of,
 )
 from warp_mpm.output.figures.style import GIGAPASCAL, MICROSECOND, MILLIMETRE, new_figure
-from warp_mpm.output.figures.view import View, box_edges, surface_of, view_of
+from warp_mpm.output.figures.view import View, beyond, box_edges, surface_of, view_of
 from warp_mpm.run_directory import Run
 from warp_mpm.scene import Wall
 
 TINTS = ("#e4cf9f", "#b4c8de", "#d3b9d6", "#bcd6b8", "#d9b8a6")  # of charges, light enough for what is written on them
 SHADES = {"in front": 1.0, "beside": 0.84, "above": 0.93}  # of faces, by where they look
 GAUGE = "#b5367a"  # their crosses and names
+MOST_TIMES, MOST_NUMBERS = 6, 24  # of detonators: with more the labels would lie on top of each other
 SIZE = 4.6  # of the longer side of the drawing [inch]
 
 
@@ -65,18 +71,47 @@ def _faces(run: Run, view: View) -> tuple[np.ndarray, np.ndarray]:
     normal = setup_of(run).section.axis
     above = int(np.argmax(np.abs(view.axes[1])))
     shade = np.array([SHADES["in front" if a == normal else "above" if a == above else "beside"] for a in range(3)])
-    cells, owner = joined(charge_cells(run))
+    cells, owner = joined(_opened_parts(run, view))
     corners, number, axis = surface_of(cells, view, owner)
     tints = np.array([to_rgb(tint) for tint in TINTS])
     return corners, tints[number.astype(int) % len(TINTS)] * shade[axis][:, None]
 
 
+def _opened_parts(run: Run, view: View) -> list[Cells]:
+    """The cells of each charge; inert ones around explosives without what lies before the middle of the hindmost."""
+    charges, axis = run.summary["charges"], setup_of(run).section.axis
+    parts = charge_cells(run)
+    for number, charge in enumerate(charges):
+        inner = [other for other in charges if _is_explosive(other) and _is_around(charge, other)]
+        if inner and not _is_explosive(charge):
+            middles = [0.5 * (other["lower_m"][axis] + other["upper_m"][axis]) for other in inner]
+            place = min(middles) if view.near(axis) else max(middles)
+            hidden = beyond(parts[number], axis, place, view)
+            parts[number] = replace(parts[number], filled=parts[number].filled & ~hidden)
+    return parts
+
+
+def _is_explosive(charge: Mapping[str, Any]) -> bool:
+    return bool(charge.get("explosive", True))  # runs of earlier versions do not say, and are drawn whole
+
+
+def _is_around(charge: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether a charge's box goes around another's."""
+    lower, upper = (np.subtract(other[end], charge[end]) for end in ("lower_m", "upper_m"))
+    slack = 1e-6 * np.abs([charge["lower_m"], charge["upper_m"]]).max()
+    return bool(np.all(lower >= -slack) and np.all(upper <= slack))
+
+
 def _label_detonators(axes: Axes, run: Run, view: View) -> None:
-    """Number and time of each point detonator, beside it."""
-    for number, detonator in enumerate(setup_of(run).detonators, start=1):
-        if not isinstance(detonator, PlaneDetonator):
+    """Number and time of each point detonator, beside it; of many numbers alone between the first and the last."""
+    points = [(n, item) for n, item in enumerate(setup_of(run).detonators, 1) if not isinstance(item, PlaneDetonator)]
+    every = math.ceil(len(points) / MOST_NUMBERS)
+    for index, (number, detonator) in enumerate(points):
+        text, is_end = f"{number}", index in (0, len(points) - 1)
+        if is_end or len(points) <= MOST_TIMES:
+            text += f": {detonator.time / MICROSECOND:.4g} µs"
+        if is_end or index % every == 0:
             x, y = view.project(np.array(detonator.position)) / MILLIMETRE
-            text = f"{number}: {detonator.time / MICROSECOND:.4g} µs"
             axes.annotate(text, (x, y), (6.0, 4.0), textcoords="offset points", fontsize=8.0)
 
 

@@ -79,14 +79,14 @@ def opened(cells: Cells, setup: SceneDescription, view: View, corner: np.ndarray
     With a corner (3,) [m] only the quarter goes that lies beyond it on the side which the view is turned to.
     """
     section = setup.section
-    removed = _beyond(cells, section.axis, section.coordinate, view)
+    removed = beyond(cells, section.axis, section.coordinate, view)
     if corner is not None:
         side = section.in_plane[0]
-        removed = removed & _beyond(cells, side, corner[side], view)
+        removed = removed & beyond(cells, side, corner[side], view)
     return replace(cells, filled=cells.filled & ~removed)
 
 
-def _beyond(cells: Cells, axis: int, place: float, view: View) -> np.ndarray:
+def beyond(cells: Cells, axis: int, place: float, view: View) -> np.ndarray:
     """Which cells lie beyond a place along an axis, seen from behind; of a shape that broadcasts over them all."""
     centres = cells.centres(axis)
     shape = np.ones(3, dtype=int)
