@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 import trimesh
+from runs_for_tests import first_frame, left_by
 
 from warp_mpm.config import Save
 from warp_mpm.detonators import PointDetonator
 from warp_mpm.errors import InputError
 from warp_mpm.exact.kenamond import inert_sphere
+from warp_mpm.output.figures.particles import particles_figure
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.scenes.from_mesh import write_ring
 from warp_mpm.simulation import simulate
@@ -64,6 +66,15 @@ def test_the_section_cuts_matter(tmp_path, bodies, height):
     assert scene.section.coordinate == pytest.approx(height, abs=1e-6)  # an STL file is in single precision
     layer = np.abs(scene.charges[0].positions[:, 2] - height) < 5e-3
     assert layer.any()
+
+
+def test_the_detail_of_the_particles_shows_some(tmp_path):
+    """The detonator is at the rim of the base, beside all that the section cuts."""
+    scene = load_scene("from_mesh", mesh=stl(tmp_path / "cone.stl", CONE), cell_size=4e-3)
+    axes = particles_figure(left_by(tmp_path, scene, frames=[first_frame(scene)])).axes[1]
+    x, y = axes.lines[-1].get_data()  # the detonator is out of the window
+    seen = (x > axes.get_xlim()[0]) & (x < axes.get_xlim()[1]) & (y > axes.get_ylim()[0]) & (y < axes.get_ylim()[1])
+    assert np.count_nonzero(seen) > 100  # of 256 if all 64 cells were full
 
 
 def test_the_shipped_ring_is_cut_in_the_middle():

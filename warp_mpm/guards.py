@@ -20,17 +20,18 @@ NOTABLE_CLAMP = 1e-3  # of all energy, from which on its clamping is worth a war
 SHORTEST_STEP = 1e-5  # of the first time step; shorter ones do not come to an end
 
 
-def check_scene_there(path: Path, scene: str) -> None:
-    """Refuse to mix the files of two scenes in one run directory; that of the same scene may be written again.
+def directory_for(scene: str, path: Path) -> Path:
+    """Make the run directory of a scene; one that holds a run of another scene is left alone, lest their files mix.
 
     Raises:
-        InputError: a run of another scene is there.
+        InputError: it holds such a run, or cannot be made or written.
     """
     there = scene_in(path)
     if there is not None and there != scene:
         got = f"{str(path)!r}, which holds a run of {there!r}"
         remedy = "choose another one with -o, or remove it"
         raise mistake("output", f"a directory without a run of another scene than {scene!r}", got, remedy)
+    return writable_directory(path)
 
 
 def writable_directory(path: Path) -> Path:

@@ -17,7 +17,7 @@ from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, Totals, history_row, sparse_share, totals_of
 from warp_mpm.errors import SimulationError, Terminated
 from warp_mpm.fingerprint import fingerprints
-from warp_mpm.guards import check_memory, check_scene_there, check_state, clamp_warnings, writable_directory
+from warp_mpm.guards import check_memory, check_state, clamp_warnings, directory_for
 from warp_mpm.isosurface import pressure_isosurface
 from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.launch import Launcher, find_device
@@ -124,7 +124,7 @@ class _Run:
         self.progress = progress
         self.begin = time.perf_counter()  # [s]; of a resumed run, as if it had gone on all the time
         self.launcher = Launcher(find_device(device), threads)
-        self.output = None if output is None else _run_directory(Path(output), scene)
+        self.output = None if output is None else directory_for(scene.name, Path(output))
         self.model = build_model(scene, config, self.launcher.device)
         check_memory(self.model)
         self.checkpoints = Checkpoints(self.output, self._identity(config), save)
@@ -384,11 +384,6 @@ class _Run:
         if self.save.frames <= self.steps + 1:
             return []
         return [f"frames: {self.save.frames} asked for, but only {self.steps} steps taken: some frames are repeated"]
-
-
-def _run_directory(path: Path, scene: Scene) -> Path:
-    check_scene_there(path, scene.name)
-    return writable_directory(path)
 
 
 def _solver_values(model: Model) -> dict[str, Any]:
