@@ -9,10 +9,12 @@ import pytest
 import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as some
-from solids_for_tests import cube_mesh, ring_mesh
+from scenes_for_tests import explosive, start
+from solids_for_tests import RING, cube_mesh, ring_mesh
 
 from warp_mpm.builder import SceneBuilder
 from warp_mpm.cli import main
+from warp_mpm.detonators import PointDetonator
 from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box, Mesh
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
@@ -323,3 +325,34 @@ def test_a_mesh_of_the_wrong_unit_is_told_so(tmp_path):
     assert builder_with(load_mesh(cube, unit="mm")).build().particle_count == 10**3
     text = refusal(builder_with(load_mesh(cube, unit="um")).build)
     assert "x extent 0.0005 m, got particles of 0.05 m; choose a smaller cell size, and check its unit" in text
+
+
+def test_convex_surfaces_are_known():
+    """Those of a cube and a cone, single precision or not; not that of a ring, nor one with a dent."""
+    angles = 2.0 * np.pi * np.arange(36) / 36
+    rim = np.stack([0.04 * np.cos(angles), 0.04 * np.sin(angles), np.zeros(36)], axis=1)
+    vertices = np.concatenate([rim, [[0.0, 0.0, 0.06], [0.0, 0.0, 0.0]]])
+    after = np.roll(np.arange(36), -1)
+    faces = [*([k, after[k], 36] for k in range(36)), *([after[k], k, 37] for k in range(36))]
+    assert Mesh(vertices, faces).convex
+    assert Mesh(vertices.astype(np.float32), faces).convex
+    assert Mesh(*cube_mesh()).rotated((1.0, 2.0, 3.0), 0.7).convex
+    assert not RING.convex
+    dented = vertices.copy()
+    dented[37, 2] += 1e-4
+    assert not Mesh(dented, faces).convex
+
+
+def test_a_convex_surface_needs_no_grid_for_its_arrival_times(tmp_path):
+    """A cube lit at a sharp edge: times are those of the straight way, to round-off."""
+    builder = SceneBuilder("cube")
+    builder.domain((0.0, 0.0, 0.0), (0.1, 0.1, 0.1), cell_size=0.01)
+    corners, faces = cube_mesh()
+    charge = Mesh(0.06 * corners, faces).translated((0.02, 0.02, 0.02))
+    builder.charge(charge, explosive())
+    builder.detonator(PointDetonator((0.02, 0.02, 0.05)))
+    builder.end_time(1e-6)
+    scene = builder.build()
+    times = start(scene).state.field("arrival_time")
+    ways = np.linalg.norm(scene.charges[0].positions - (0.02, 0.02, 0.05), axis=1)
+    np.testing.assert_allclose(times, ways / 2800.0, rtol=1e-6)

@@ -5,6 +5,8 @@ import numpy as np
 from warp_mpm.checks import mistake
 
 SAME_PLACE = 1e-6  # of the size: vertices that are nearer are one
+MOST_COMPARED = 300_000_000  # pairs of a vertex and a face: seconds
+AT_ONCE = 5_000_000  # of them
 SHORTEST = 1e-15  # vector that has a direction: vertices are given in units of the size
 
 
@@ -65,6 +67,23 @@ def enclosed_volume(vertices: np.ndarray, faces: np.ndarray) -> float:
     """
     a, b, c = (vertices[corner] for corner in faces.T)
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
+def is_convex(vertices: np.ndarray, faces: np.ndarray) -> bool:
+    """Whether no vertex lies before the plane of any face, by more than `SAME_PLACE`; not if that takes long to find.
+
+    Args:
+        vertices: (n, 3), in units of the size.
+        faces: indices of vertices (m, 3).
+    """
+    if len(vertices) * len(faces) > MOST_COMPARED:
+        return False
+    a, b, c = (vertices[corner] for corner in faces.T)
+    normals = _unit(np.cross(b - a, c - a))
+    at = np.einsum("ij,ij->i", normals, a)
+    step = max(1, AT_ONCE // len(vertices))
+    starts = range(0, len(faces), step)
+    return all(np.max(normals[k : k + step] @ vertices.T - at[k : k + step, None]) <= SAME_PLACE for k in starts)
 
 
 def outward_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:

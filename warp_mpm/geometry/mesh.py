@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from warp_mpm.checks import mistake
-from warp_mpm.geometry.closed_surface import check_closed, enclosed_volume, merged, outward_normals
+from warp_mpm.geometry.closed_surface import check_closed, enclosed_volume, is_convex, merged, outward_normals
 from warp_mpm.geometry.placement import Placement
 from warp_mpm.geometry.solid import Bounds, Solid
 from warp_mpm.kernels import surface
@@ -47,6 +47,7 @@ class Mesh(Solid):
         self._check_volume()
         self._check_cuts()
         self._check_samples()
+        object.__setattr__(self, "convex", is_convex(self._near, faces))
 
     def bounds(self) -> Bounds:
         """The tightest box around the vertices."""
@@ -75,7 +76,8 @@ class Mesh(Solid):
     def placed(self, placement: Placement) -> "Mesh":
         """Another mesh; what was checked of this one is true of it."""
         other = object.__new__(Mesh)
-        for name, value in (("vertices", placement.points(self.vertices)), ("faces", self.faces), ("name", self.name)):
+        kept = {"faces": self.faces, "name": self.name, "convex": self.convex}
+        for name, value in {"vertices": placement.points(self.vertices), **kept}.items():
             object.__setattr__(other, name, value)
         return other
 
