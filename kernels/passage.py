@@ -13,6 +13,7 @@ from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, matrix2, scalar, ve
 CAUTION = wp.constant(scalar(0.8))  # of the distance to a surface that is stepped over; interpolated ones are inexact
 NEWTON_STEPS = wp.constant(4)
 CORNER_STEPS = wp.constant(8)
+EDGE = wp.constant(scalar(8.0))  # steps, two cells: how far from an end at a sharp edge this is blunt
 ENOUGH = wp.constant(scalar(0.1))  # of what the slope promises a step must gain (Armijo's condition)
 CLOSE = wp.constant(scalar(1.0e-3))  # to the best corner: of a step
 HALVINGS = wp.constant(8)
@@ -155,20 +156,33 @@ def beginning(passage: Passage, medium: int, place: vector3) -> vector3:
 
 
 @wp.func
-def deepest(passage: Passage, medium: int, start: vector3, end: vector3, limit: scalar) -> vector2:
+def overhang(passage: Passage, medium: int, place: vector3) -> scalar:
+    """How far outside its medium a place in it seems to be [m]: the lattice blunts sharp edges."""
+    distance = distance_at(passage, medium, place)
+    return wp.where(distance > passage.tolerance and distance <= passage.reach, distance, ZERO)
+
+
+@wp.func
+def deepest(
+    passage: Passage, medium: int, start: vector3, end: vector3, limit: scalar, at_start: scalar, at_end: scalar
+) -> vector2:
     """How far a straight way leaves the medium at most [m], and after which share of the way.
 
-    Stops where it first leaves it by more than `limit`. Where the surface is far away long steps are taken.
+    Stops where it first leaves it by more than `limit`. Where the surface is far away long steps are taken. An end at a
+    sharp edge seems to be outside (`overhang`, here `at_start` and `at_end`), and what is near it may seem so as far.
     """
     way = end - start
     length = wp.length(way)
     worst = scalar(-1.0e30)
     where = scalar(0.0)
     gone = scalar(0.0)
+    per_edge = ONE / (EDGE * passage.step)
     while gone < length and worst <= limit:
         distance = distance_at(passage, medium, start + way * (gone / length))
-        if distance > worst:
-            worst = distance
+        left = distance - at_start * wp.max(ONE - gone * per_edge, ZERO)
+        left -= at_end * wp.max(ONE - (length - gone) * per_edge, ZERO)
+        if left > worst:
+            worst = left
             where = gone / length
         gone += wp.max(-CAUTION * distance - passage.step, passage.step)
     return vector2(worst, where)
@@ -178,7 +192,9 @@ def deepest(passage: Passage, medium: int, start: vector3, end: vector3, limit: 
 def is_clear(passage: Passage, medium: int, start: vector3, end: vector3) -> bool:
     """Whether the straight way stays in the medium."""
     begin = beginning(passage, medium, start)
-    return deepest(passage, medium, begin, end, passage.tolerance)[0] <= passage.tolerance
+    at_start = overhang(passage, medium, start)
+    at_end = overhang(passage, medium, end)
+    return deepest(passage, medium, begin, end, passage.tolerance, at_start, at_end)[0] <= passage.tolerance
 
 
 @wp.func
@@ -188,12 +204,15 @@ def corner_between(passage: Passage, medium: int, start: vector3, end: vector3) 
     Where the way is deepest in the obstacle, the nearest point of the surface; or the same for the way to that point.
     """
     begin = beginning(passage, medium, start)
+    at_start = overhang(passage, medium, start)
+    at_end = overhang(passage, medium, end)
     corner = end
     for _ in range(HALVINGS):
-        found = deepest(passage, medium, begin, corner, -LOWEST)
+        found = deepest(passage, medium, begin, corner, -LOWEST, at_start, at_end)
         if found[0] <= passage.tolerance:
             break
         corner = onto_surface(passage, medium, begin + (corner - begin) * found[1])
+        at_end = ZERO
     return corner
 
 

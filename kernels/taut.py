@@ -252,7 +252,7 @@ def excess(passage: Passage, medium: int, start: vector3, corner: vector3) -> sc
 
     8 s^2 / (3 l) for a flat arc of the height s over a chord l.
     """
-    found = deepest(passage, medium, corner, start, scalar(1.0e30))
+    found = deepest(passage, medium, corner, start, scalar(1.0e30), ZERO, ZERO)
     longer = scalar(0.0)
     height = surface_at(passage, medium, corner + (start - corner) * found[1]).distance
     if height > ZERO and found[1] > ZERO:
@@ -326,7 +326,7 @@ def is_sound(passage: Passage, way: Way, place: vector3, medium: int) -> bool:
             leg_medium = way.media[n - 1]
         if n < way.count:
             start = way.corners[n]
-        sound = sound and deepest(passage, leg_medium, start, end_of(way, n, place), limit)[0] <= limit
+        sound = sound and deepest(passage, leg_medium, start, end_of(way, n, place), limit, ZERO, ZERO)[0] <= limit
     return sound
 
 

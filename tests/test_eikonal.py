@@ -14,7 +14,7 @@ from warp_mpm.builder import SceneBuilder
 from warp_mpm.detonators import CordDetonator, LineDetonator, PlaneDetonator, PointDetonator, SphereDetonator
 from warp_mpm.errors import InputError
 from warp_mpm.exact.arrival import straight_arrival
-from warp_mpm.geometry import Box, Sphere
+from warp_mpm.geometry import Box, Cone, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.kernels.eos.mie_gruneisen import MieGruneisen
 from warp_mpm.kernels.precision import NEVER
@@ -229,3 +229,22 @@ def test_a_plane_detonator_lights_a_charge_with_a_hole(device):
     side = 0.02 - np.abs(place[shadow, 1] - 0.06)
     exact = (0.1 + np.hypot(place[shadow, 0] - 0.1, side)) / SPEED
     assert np.abs(in_cells(times[shadow] - exact)).max() < 0.2
+
+
+@pytest.mark.parametrize("at", [(0.0, 5.0, 0.0), (1.0, 5.0, 0.2), (5.0, 5.0, 0.0), (5.0, 5.0, 9.8)], ids=str)
+def test_sharp_edges_are_lit_and_light(at, device):
+    """A cone with a rod on its tip, no convex body: lit on its rim, beside it, in the middle and from above.
+
+    The lattice blunts the rim, half a cell deep. In the cone the ways from its base are straight, as it is convex.
+    """
+    cone, rod = Cone((0.05, 0.05, 0.0), (0.05, 0.05, 0.08), 0.05), Box((0.045, 0.045, 0.06), (0.055, 0.055, 0.1))
+    source = CELL * np.array(at)
+    ((position, time),) = arrival(
+        (10, 10, 12), {"charge": (cone | rod, explosive())}, [PointDetonator(tuple(source))]
+    ).values()
+    straight = np.linalg.norm(position - source, axis=1) / SPEED
+    assert time.max() < NEVER
+    assert np.all(time >= straight - EXACT * straight.max())
+    in_cone = cone.contains(position)
+    if at[2] < 1.0:
+        assert np.abs(time - straight)[in_cone].max() * SPEED / CELL < 0.01  # cells
