@@ -69,11 +69,9 @@ class Way:
 
 
 @wp.func
-def way_of(passage: Passage, routes: wp.array(dtype=Route), nodes_a_medium: int, node: int) -> Way:
-    """The way of a node, put together from the routes of the nodes that it came over."""
+def end_of_route(known: Route) -> Way:
+    """What a route itself says of its way: the last corner, if there is one, and what comes straight before."""
     way = Way()
-    known = routes[node]
-    parent = known.parent
     way.source = known.corner
     way.source_time = known.corner_time
     if known.medium != FIXED:
@@ -82,6 +80,15 @@ def way_of(passage: Passage, routes: wp.array(dtype=Route), nodes_a_medium: int,
         way.count = 1
         way.source = known.start
         way.source_time = known.start_time
+    return way
+
+
+@wp.func
+def way_of(passage: Passage, routes: wp.array(dtype=Route), nodes_a_medium: int, node: int) -> Way:
+    """The way of a node, put together from the routes of the nodes that it came over."""
+    known = routes[node]
+    parent = known.parent
+    way = end_of_route(known)
     while parent >= 0 and way.count < MOST - 1:
         before = routes[parent]
         medium = parent / nodes_a_medium
@@ -343,15 +350,7 @@ def taut_fan(passage: Passage, routes: wp.array(dtype=Route), nodes_a_medium: in
     change = fan.corner_time + wp.length(place - fan.corner) * slowness - known.time
     failed = taut.count < way.count or wp.abs(change) > CHANGE * passage.step * slowness
     if failed or not is_sound(passage, taut, place, medium):
-        short = Way()
-        short.source = known.corner
-        short.source_time = known.corner_time
-        if known.medium != FIXED:
-            short.corners[0] = known.corner
-            short.media[0] = known.medium
-            short.count = 1
-            short.source = known.start
-            short.source_time = known.start_time
+        short = end_of_route(known)
         alone = pulled(passage, short, place, medium, 0)
         if alone.count < short.count:
             alone.source = known.corner

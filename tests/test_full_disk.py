@@ -26,11 +26,12 @@ ROOM = {  # of which the run, which needs about 900 kB, leaves nothing for its [
 def mounted(directory, *options):
     """A file system in memory at a directory; skips the test where none may be mounted."""
     try:
-        mount = subprocess.run(["mount", "-t", "tmpfs", *options, "tmpfs", str(directory)], check=False)
+        command = ["mount", "-t", "tmpfs", *options, "tmpfs", str(directory)]
+        mount = subprocess.run(command, check=False, capture_output=True, text=True)
     except OSError:
         pytest.skip("this system has no mount")
     if mount.returncode != 0:
-        pytest.skip("only root may mount")
+        pytest.skip(f"no disk to fill, as only root may mount one: {mount.stderr.strip()}")
     try:
         yield
     finally:

@@ -84,7 +84,9 @@ def test_the_last_good_checkpoint_is_named_and_can_be_read(tmp_path, monkeypatch
                 monkeypatch.setattr(guards, "SHORTEST_STEP", 10.0)
 
     scene, save = load_scene("two_point", cell_size=2e-2), Save(checkpoint_steps=3, figures=False)
-    with pytest.raises(SimulationError, match=r"last good checkpoint is .*checkpoint_00000009.npz, --resume goes on"):
+    with pytest.raises(
+        SimulationError, match=r"last good checkpoint is .*checkpoint_00000009.npz, --resume \(resume=True\) goes on"
+    ):
         simulate(scene, save=save, output=tmp_path, progress=Impatient())
     header, _ = read_checkpoint(checkpoint_files(tmp_path)[0])
     assert header["values"]["steps"] == 9

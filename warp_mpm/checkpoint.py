@@ -107,7 +107,9 @@ class Checkpoints:
 
     def remedy(self) -> str:
         """How to go on after the run has stopped, as the end of a message."""
-        return "" if self.latest is None else f"; the last good checkpoint is {self.latest}, --resume goes on from it"
+        if self.latest is None:
+            return ""
+        return f"; the last good checkpoint is {self.latest}, --resume (resume=True) goes on from it"
 
     def _compare(self, path: Path, identity: object) -> None:
         if not isinstance(identity, dict):
