@@ -11,7 +11,6 @@ from warp_mpm.kernels.records import Grid
 EDGE = wp.constant(4)
 SHIFT = wp.constant(2)  # its binary logarithm
 STENCIL = wp.constant(3)  # nodes along an axis, at most
-GHOST_REACH = wp.constant(2)  # nodes from one next to a wall to its ghost behind the wall
 NODES = wp.constant(64)  # of a block
 
 
@@ -25,11 +24,10 @@ def block_of(node: int, blocks: int) -> int:
 def stamp_blocks(grid: Grid, lowest: wp.vec3i, step: int):
     """Say that a stencil of three nodes per axis, the lowest given, was scattered to in a step.
 
-    That covers every shape function's nodes, and the cells of the field. What is reached, ghosts behind walls included,
-    lies in one block or two along an axis: eight writes, some of them twice, without a branch (one per particle is
-    slower than the writes).
+    That covers every shape function's nodes, and the cells of the field. What is reached lies in one block or two along
+    an axis: eight writes, some of them twice, without a branch (one per particle is slower than the writes).
     """
-    reach = STENCIL - 1 + GHOST_REACH
+    reach = STENCIL - 1
     y = block_of(lowest[1], grid.blocks[1]) * grid.blocks[2]
     z = block_of(lowest[2], grid.blocks[2])
     to_y = block_of(lowest[1] + reach, grid.blocks[1]) * grid.blocks[2] - y

@@ -82,7 +82,7 @@ def tents_around(grid: Grid, cell: wp.vec3s, fraction: vector3) -> Tents:
 @wp.func
 def scatter_content(grid: Grid, cell: wp.vec3s, fraction: vector3, pressure: scalar, volume: scalar):
     """Particle -> cells: sum L V p [J] and sum L V [m3]."""
-    scatter_cells(tents_around(grid, cell, fraction), grid.content, vector2(pressure * volume, volume))
+    scatter_cells(tents_around(grid, cell, fraction), grid.content_sums, vector2(pressure * volume, volume))
 
 
 @wp.func
@@ -113,13 +113,15 @@ def image_cell(grid: Grid, cell: wp.vec3i, sides: wp.vec3i) -> int:
 
 @wp.func
 def solve_cell(grid: Grid, boundary: Boundary, cell: wp.vec3i):
-    """Sums of the scatter -> pressure and filling of a cell, and of its ghosts behind walls."""
+    """Sums of the scatter -> pressure and filling of a cell, and of its ghosts behind walls; empties the sums."""
     owned = mirrored_sides(boundary, last_cell(grid.cells), cell, 0)
     total = vector2()
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
-                total += grid.content[image_cell(grid, cell, image_sides(owned, i, j, k))]
+                image = image_cell(grid, cell, image_sides(owned, i, j, k))
+                total += grid.content_sums[image]
+                grid.content_sums[image] = vector2()
     content = total / (grid.spacing[0] * grid.spacing[1] * grid.spacing[2])
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):

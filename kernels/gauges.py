@@ -2,10 +2,9 @@
 
 import warp as wp
 
-from warp_mpm.kernels.grid import node_density
+from warp_mpm.kernels.grid import node_density, node_velocity
 from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
-from warp_mpm.kernels.vectors import first_three
 
 # Lanes of a gauge in a record's row.
 GAUGE_PRESSURE = wp.constant(0)  # [Pa]
@@ -89,7 +88,7 @@ def record_gauges(
                     mass = w * node_density(grid, index)
                     pressure += w * grid.field[n][0]
                     density += mass
-                    velocity += mass * first_three(grid.node[n])
+                    velocity += mass * node_velocity(grid, index)
         velocity *= wp.where(density > ZERO, ONE / density, ZERO)
         write_gauge(rows, row, lane, pressure, velocity, density, place_in(places, cell, f))
     else:

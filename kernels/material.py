@@ -21,7 +21,7 @@ from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Cloc
 from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, gas_share, relax_density, yielding
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
-from warp_mpm.kernels.transfer import look_ahead_function
+from warp_mpm.kernels.transfer import Ahead, look_ahead_function
 from warp_mpm.kernels.vectors import at_rest_if_slow
 from warp_mpm.kernels.viscosity import (
     Viscosity,
@@ -236,7 +236,7 @@ def update_kernel(
 ) -> wp.Kernel:
     """Strain, energy, density, damping, motion (`move`), then burn fraction and pressure for the next forces."""
     deform = deformation_function(shape, strain, damped)
-    look_ahead = look_ahead_function(shape, False, strain is Strain.REPROJECTED)
+    look_ahead = look_ahead_function(shape, Ahead.END if strain is Strain.REPROJECTED else Ahead.START)
     respond = response_function(eos, burn, unreacted)
     sound_speed_squared = eos.sound_speed_squared
     passive = eos.passive_volume

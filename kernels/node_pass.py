@@ -9,9 +9,8 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.blocks import EDGE, NODES, is_active, node_of_block, on_grid
-from warp_mpm.kernels.precision import scalar
+from warp_mpm.kernels.precision import ONE, ZERO, scalar
 from warp_mpm.kernels.records import Clock, Grid, node_index
-from warp_mpm.kernels.stencil import prefetch_function
 from warp_mpm.kernels.walls import Boundary
 
 
@@ -36,17 +35,42 @@ def lies_inside(grid: Grid, lowest: wp.vec3i) -> bool:
     return inside
 
 
-# Asks for all rows of a block at once: where gas is thin, a pass is a walk from one wait for memory to the next.
-prefetch_block = prefetch_function(EDGE, 8)
+@wp.func
+def has_no_face_near(grid: Grid, index: wp.vec3i) -> bool:
+    """The same of a single node."""
+    inside = True
+    for axis in range(3):
+        if index[axis] < 2 or index[axis] > grid.cells[axis] - 2:
+            inside = False
+    return inside
+
+
+@wp.func
+def inverse_mass(grid: Grid, mass: scalar) -> scalar:
+    """1 / mass [1/kg], or 0 of a node that counts as empty."""
+    counts = mass > grid.light_mass
+    return wp.where(counts, ONE, ZERO) / wp.where(counts, mass, ONE)
+
+
+@wp.func
+def damped_share(now: Clock, sound_speed: scalar) -> scalar:
+    """Alpha of a node: k s / (1 + k s), s the cells that sound crosses in the step."""
+    crossing = now.damping * sound_speed
+    return crossing / (ONE + crossing)
 
 
 @functools.cache
-def node_kernel(visit: wp.Function, visit_inside: wp.Function, age: int) -> wp.Kernel:
+def node_kernel(
+    visit: wp.Function, visit_inside: wp.Function | None, age: int, retire: wp.Function | None = None
+) -> wp.Kernel:
     """Kernel over the blocks that were scattered to `age` steps ago, from `begin` on.
 
     visit(grid, boundary, now, phase, slot, index) and visit_inside(grid, boundary, now, phase, slot, n), with the
-    clock's values `now`, a node's `index` (i, j, k) and its flat index n.
+    clock's values `now`, a node's `index` (i, j, k) and its flat index n. Without `visit_inside` there is nothing to do
+    for nodes that have no face near. With `retire`, retire(grid, n) is for the nodes of blocks that were last scattered
+    to a step before that.
     """
+    goes_inside, retires = visit_inside is not None, retire is not None
 
     @wp.kernel(enable_backward=False, module="unique")
     def over_nodes(grid: Grid, boundary: Boundary, clock: wp.array(dtype=Clock), phase: Phase, slot: int, begin: int):
@@ -56,18 +80,25 @@ def node_kernel(visit: wp.Function, visit_inside: wp.Function, age: int) -> wp.K
         if is_active(grid, block, now.step - wp.static(age)):
             lowest = node_of_block(grid, block, 0)
             if lies_inside(grid, lowest):
-                first = node_index(grid, lowest[0], lowest[1], lowest[2])
-                if grid.workers == 1:
-                    prefetch_block(grid.node, first, grid.stride_x, grid.stride_y)
-                    if grid.kick.shape[0] > 0:
-                        prefetch_block(grid.kick, first, grid.stride_x, grid.stride_y)
-                for n in range(thread % grid.workers, NODES, grid.workers):
-                    node = first + (n >> 4) * grid.stride_x + ((n >> 2) & 3) * grid.stride_y + (n & 3)
-                    visit_inside(grid, boundary, now, phase, slot, node)
+                if wp.static(goes_inside):
+                    first = node_index(grid, lowest[0], lowest[1], lowest[2])
+                    for n in range(thread % grid.workers, NODES, grid.workers):
+                        node = first + (n >> 4) * grid.stride_x + ((n >> 2) & 3) * grid.stride_y + (n & 3)
+                        visit_inside(grid, boundary, now, phase, slot, node)
             else:
                 for n in range(thread % grid.workers, NODES, grid.workers):
                     index = node_of_block(grid, block, n)
-                    if on_grid(grid, index):
+                    if has_no_face_near(grid, index):
+                        if wp.static(goes_inside):
+                            node = node_index(grid, index[0], index[1], index[2])
+                            visit_inside(grid, boundary, now, phase, slot, node)
+                    elif on_grid(grid, index):
                         visit(grid, boundary, now, phase, slot, index)
+        if wp.static(retires):
+            if is_active(grid, block, now.step - wp.static(age + 1)):
+                for n in range(thread % grid.workers, NODES, grid.workers):
+                    index = node_of_block(grid, block, n)
+                    if on_grid(grid, index):
+                        retire(grid, node_index(grid, index[0], index[1], index[2]))
 
     return over_nodes

@@ -38,7 +38,10 @@ def sort_keys(
     p = wp.tid()
     cell = particles.position[p].cell
     cells = wp.int64(grid.cells[0]) * wp.int64(grid.cells[1]) * wp.int64(grid.cells[2])
-    flat = (wp.int64(cell[0]) * wp.int64(grid.cells[1]) + wp.int64(cell[1])) * wp.int64(grid.cells[2])
+    first, second = 0, 1
+    if slabs.axis == 0:
+        first, second = 1, 0
+    flat = (wp.int64(cell[first]) * wp.int64(grid.cells[second]) + wp.int64(cell[second])) * wp.int64(grid.cells[2])
     flat = flat + wp.int64(cell[2])
     slab = slab_of(slabs, int(cell[slabs.axis]))
     if particles.motion[p].mass == ZERO:

@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from warp_mpm.kernels.grid import filling_of
 from warp_mpm.kernels.precision import HALF, NEVER, ONE, ZERO, scalar, vector3
 from warp_mpm.kernels.records import PARTICLE_PRESSURE, Clock, Grid, Maxima
 
@@ -18,7 +19,7 @@ def highest_in_region(grid: Grid, nodes: wp.array(dtype=int), begin: int, end: i
     peak = ZERO
     for n in range(begin, end):
         node = nodes[n]
-        if grid.node[node][7] >= HALF:
+        if filling_of(grid, node) >= HALF:
             peak = wp.max(peak, grid.field[node][0])
     return peak
 

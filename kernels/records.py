@@ -68,16 +68,18 @@ class Particles:
 
 @wp.struct
 class Grid:
-    """The background grid. Nodal quantities turn in place from sums into values (see `grid.py`)."""
+    """The background grid. Sums are scattered to, and emptied by the pass that has read them last; the rest is written
+    for all nodes of active blocks before it is read. What is scattered at the end of a step stays until the next one
+    has used it: outputs read the sums and the field."""
 
-    node: wp.array(dtype=vector8)  # momentum, mass, force, volume -> velocity, mass, acceleration, filling; and for
-    # the material update of MUSL: velocity that moves the particles, mass, velocity that does the work, alpha
+    sums: wp.array(dtype=vector8)  # momentum, mass | force, volume, as they were scattered
     field: wp.array(dtype=vector2)  # sums of w V p [J] and w m c^2 [J] -> field pressure [Pa], sound speed [m/s]
-    content: wp.array(dtype=vector2)  # of cells: L V p [J] and L V [m3] -> pressure [Pa], filling (see `content.py`)
-    reprojected: wp.array(dtype=vector4)  # momentum, kinetic energy -> velocity, or alpha times it with the
-    # damping [m/s], and its heat [J/kg]
-    kick: wp.array(dtype=vector8)  # sharpened acceleration in the lanes of `node`; then what `node` holds for the
-    # material update, not yet sharpened (see `sharpen.py`)
+    content_sums: wp.array(dtype=vector2)  # of cells: L V p [J] and L V [m3]
+    content: wp.array(dtype=vector2)  # of cells: pressure [Pa], filling (see `content.py`)
+    start: wp.array(dtype=vector8)  # velocity, mass | acceleration, 1 / mass, or 0 where a node counts as empty
+    reprojected: wp.array(dtype=vector4)  # sums of momentum and kinetic energy
+    end: wp.array(dtype=vector8)  # velocity that moves the particles, mass | velocity that does the work, alpha
+    damping: wp.array(dtype=vector4)  # re-projected velocity, or alpha times it [m/s], and the damping's heat [J/kg]
     cells: wp.vec3i  # cells of the domain per axis
     stride_x: int  # flat index step of a node along x
     stride_y: int  # along y; along z it is 1

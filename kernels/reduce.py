@@ -155,4 +155,4 @@ def audit_grid(grid: Grid, boundary: Boundary, clock: wp.array(dtype=Clock), sum
         for n in range(thread % grid.workers, NODES, grid.workers):
             index = node_of_block(grid, block, n)
             if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
-                wp.atomic_add(sums, 0, wp.float64(grid.node[node_index(grid, index[0], index[1], index[2])][3]))
+                wp.atomic_add(sums, 0, wp.float64(grid.sums[node_index(grid, index[0], index[1], index[2])][3]))

@@ -20,7 +20,7 @@ from warp_mpm.kernels.content import gather_content
 from warp_mpm.kernels.precision import HALF, matrix3, scalar, vector2, vector3
 from warp_mpm.kernels.records import Clock, Grid, Matter, Motion, Position
 from warp_mpm.kernels.shape import Shape
-from warp_mpm.kernels.stencil import gather_function, gather_gradient_function
+from warp_mpm.kernels.stencil import gather_function, gather_gradient_function, stencil_type
 from warp_mpm.kernels.transfer import stencil_function
 from warp_mpm.kernels.vectors import first_three, second_three
 from warp_mpm.kernels.viscosity import unit_vector
@@ -53,15 +53,24 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
     gather_gradient = gather_gradient_function(shape.width, 8)
     gather_nodal = gather_function(shape.width, 4)
     gather_nodal_gradient = gather_gradient_function(shape.width, 4)
+    record = stencil_type(shape.width)
+    rows_type = wp.types.matrix((4, 8), scalar)
     reprojected = strain is Strain.REPROJECTED
     end = strain is Strain.END
+
+    @wp.func
+    def gather_all(grid: Grid, stencil: record) -> rows_type:
+        if wp.static(reprojected):
+            return gather_gradient(stencil, grid.end)
+        else:
+            return gather_gradient(stencil, grid.start)
 
     @wp.func
     def gather_strain(
         grid: Grid, cell: wp.vec3s, fraction: vector3, velocity: vector3, half_width: scalar, dt: scalar
     ) -> StrainIncrement:
         stencil = stencil_of(grid, cell, fraction, half_width)
-        rows = gather_gradient(stencil, grid.node)
+        rows = gather_all(grid, stencil)
         sums = rows[0]
         result = StrainIncrement()
         result.motion = first_three(sums)
@@ -75,11 +84,11 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
             result.acceleration = dt * second_three(sums)
             result.motion += result.acceleration
         if wp.static(reprojected and damped):
-            nodal = gather_nodal(stencil, grid.reprojected)
+            nodal = gather_nodal(stencil, grid.damping)
             result.damping = first_three(nodal) - sums[7] * velocity
             result.heat = nodal[3]
         if wp.static(reprojected and not damped):
-            nodal_rows = gather_nodal_gradient(stencil, grid.reprojected)
+            nodal_rows = gather_nodal_gradient(stencil, grid.damping)
             result.gradient = wp.matrix_from_cols(
                 first_three(nodal_rows[1]), first_three(nodal_rows[2]), first_three(nodal_rows[3])
             )

@@ -5,6 +5,7 @@ particles from `begin` on, one a thread.
 """
 
 import functools
+from enum import Enum
 
 import warp as wp
 
@@ -64,32 +65,42 @@ def stencil_function(shape: Shape) -> wp.Function:
     return stencil_of
 
 
-@functools.cache
-def look_ahead_function(shape: Shape, sharpened: bool, reprojected: bool, contents: bool = False) -> wp.Function:
-    """Device function (particles, grid, p): ask for the nodes of a particle some places on, before it is its turn.
+class Ahead(Enum):
+    """What a pass over the particles will need of the grid."""
 
-    That is `kick` when `sharpened`, else `node`; and the re-projection's sums, or the field's and the cells'.
-    """
+    START = "the start of the step"
+    START_AND_REPROJECTED = "the start of the step, and the sums of the re-projection"
+    END = "the velocities of the step, its damping, and what cells hold"
+    SUMS = "the sums of the scatter"
+
+
+@functools.cache
+def look_ahead_function(shape: Shape, what: Ahead) -> wp.Function:
+    """Device function (particles, grid, p): ask for the nodes of a particle some places on, before it is its turn."""
     lowest_node = lowest_node_function(shape)
     prefetch = prefetch_function(shape.width, 8)
-    prefetch_reprojected = prefetch_function(shape.width, 4)
-    prefetch_field = prefetch_function(shape.width, 2)
-    prefetch_content = prefetch_function(shape.width, 2)
+    prefetch_four = prefetch_function(shape.width, 4)
+    prefetch_two = prefetch_function(shape.width, 2)
+    start = what in (Ahead.START, Ahead.START_AND_REPROJECTED)
+    reprojected = what is Ahead.START_AND_REPROJECTED
+    end, sums = what is Ahead.END, what is Ahead.SUMS
 
     @wp.func
     def look_ahead(particles: Particles, grid: Grid, p: int):
         position = particles.position[wp.min(p + AHEAD, particles.position.shape[0] - 1)]
         lowest = lowest_node(position.cell, position.fraction)
         first = node_index(grid, lowest[0], lowest[1], lowest[2])
-        if wp.static(sharpened):
-            prefetch(grid.kick, first, grid.stride_x, grid.stride_y)
-        else:
-            prefetch(grid.node, first, grid.stride_x, grid.stride_y)
+        if wp.static(start):
+            prefetch(grid.start, first, grid.stride_x, grid.stride_y)
         if wp.static(reprojected):
-            prefetch_reprojected(grid.reprojected, first, grid.stride_x, grid.stride_y)
-        if wp.static(contents):
-            prefetch_field(grid.field, first, grid.stride_x, grid.stride_y)
-            prefetch_content(grid.content, first, grid.stride_x, grid.stride_y)
+            prefetch_four(grid.reprojected, first, grid.stride_x, grid.stride_y)
+        if wp.static(end):
+            prefetch(grid.end, first, grid.stride_x, grid.stride_y)
+            prefetch_four(grid.damping, first, grid.stride_x, grid.stride_y)
+        if wp.static(sums):
+            prefetch(grid.sums, first, grid.stride_x, grid.stride_y)
+            prefetch_two(grid.field, first, grid.stride_x, grid.stride_y)
+            prefetch_two(grid.content_sums, first, grid.stride_x, grid.stride_y)
 
     return look_ahead
 
@@ -127,7 +138,7 @@ def affine_gradient_function(shape: Shape) -> wp.Function:
         for i in range(width):
             for j in range(width):
                 for k in range(width):
-                    node = grid.node[stencil.first + i * grid.stride_x + j * grid.stride_y + k]
+                    node = grid.start[stencil.first + i * grid.stride_x + j * grid.stride_y + k]
                     bx = ax[i] * stencil.wy[j] * stencil.wz[k]
                     by = stencil.wx[i] * ay[j] * stencil.wz[k]
                     bz = stencil.wx[i] * stencil.wy[j] * az[k]
@@ -158,7 +169,7 @@ def scatter_kernel(
     node_offset = node_offset_function(shape)
     scatter_gradient = scatter_gradient_function(width, 8)
     scatter_field = scatter_function(width, 2)
-    look_ahead = look_ahead_function(shape, False, False, True)
+    look_ahead = look_ahead_function(shape, Ahead.SUMS)
 
     @wp.kernel(enable_backward=False, module="unique")
     def scatter(
@@ -200,7 +211,7 @@ def scatter_kernel(
             force_z = directed[2] * thrust + vector3(ZERO, ZERO, push)
             elasticity = mass * matter.sound_speed * matter.sound_speed
             scatter_field(stencil, grid.field, vector2(pressure_volume, elasticity))
-        scatter_gradient(stencil, grid.node, scattered, force_on(force_x), force_on(force_y), force_on(force_z))
+        scatter_gradient(stencil, grid.sums, scattered, force_on(force_x), force_on(force_y), force_on(force_z))
         if wp.static(affine and momentum):
             for i in range(width):
                 for j in range(width):
@@ -209,7 +220,7 @@ def scatter_kernel(
                         extra = weight * (particles.affine[p] * node_offset(grid, fraction, i, j, k))
                         node = stencil.first + i * grid.stride_x + j * grid.stride_y + k
                         wp.atomic_add(
-                            grid.node,
+                            grid.sums,
                             node,
                             vector8(extra[0], extra[1], extra[2], ZERO, ZERO, ZERO, ZERO, ZERO),
                         )
@@ -220,14 +231,11 @@ def scatter_kernel(
 
 
 @functools.cache
-def advance_kernel(
-    shape: Shape, blend: bool, affine: bool, reproject: bool, sharpened: bool, thin: bool = False
-) -> wp.Kernel:
+def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, thin: bool = False) -> wp.Kernel:
     """Nodes -> particle velocity, and for MUSL back again (`reproject`).
 
     FLIP: v += dt sum w a. With `blend` a share s of PIC: (1 - s)(v + dt a) + s sum w (v + dt a)_i; APIC is s = 1 and
-    C = sum (v + dt a)_i (x_i - x_p)^T w / D. Re-projection: sum w m v and, for the damping, sum w m v^2 / 2. With
-    `sharpened`, which does not go with the other two, a comes from `kick`.
+    C = sum (v + dt a)_i (x_i - x_p)^T w / D. Re-projection: sum w m v and, for the damping, sum w m v^2 / 2.
     """
     width = shape.width
     stencil_of = stencil_function(shape)
@@ -235,7 +243,7 @@ def advance_kernel(
     node_offset = node_offset_function(shape)
     gather = gather_function(width, 8)
     scatter = scatter_function(width, 4)
-    look_ahead = look_ahead_function(shape, sharpened, reproject)
+    look_ahead = look_ahead_function(shape, Ahead.START_AND_REPROJECTED if reproject else Ahead.START)
 
     @wp.kernel(enable_backward=False, module="unique")
     def advance(
@@ -257,11 +265,7 @@ def advance_kernel(
         position = particles.position[p]
         fraction = position.fraction
         stencil = stencil_of(grid, position.cell, fraction, half_width)
-        sums = vector8()
-        if wp.static(sharpened):
-            sums += gather(stencil, grid.kick)
-        else:
-            sums += gather(stencil, grid.node)
+        sums = gather(stencil, grid.start)
         increment = dt * second_three(sums)
         velocity = motion.velocity + increment
         if wp.static(blend):
@@ -295,7 +299,7 @@ def displacement_function(shape: Shape) -> wp.Function:
 
     @wp.func
     def displacement(grid: Grid, cell: wp.vec3s, fraction: vector3, half_width: scalar, dt: scalar) -> vector3:
-        sums = gather(stencil_of(grid, cell, fraction, half_width), grid.node)
+        sums = gather(stencil_of(grid, cell, fraction, half_width), grid.start)
         return dt * wp.cw_mul(first_three(sums) + dt * second_three(sums), grid.inverse_spacing)
 
     return displacement

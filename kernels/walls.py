@@ -93,6 +93,18 @@ def free_components(boundary: Boundary, cells: wp.vec3i, node: wp.vec3i) -> vect
 
 
 @wp.func
+def meets_wall(boundary: Boundary, cells: wp.vec3i, node: wp.vec3i) -> bool:
+    """Whether a node lies on a wall or owns a ghost behind one."""
+    meets = False
+    for axis in range(3):
+        if node[axis] <= 1 and boundary.wall[2 * axis] != WALL_OPEN:
+            meets = True
+        if node[axis] >= cells[axis] - 1 and boundary.wall[2 * axis + 1] != WALL_OPEN:
+            meets = True
+    return meets
+
+
+@wp.func
 def image_count(owned: int) -> int:
     """Images of a node along an axis: itself and the ghosts it owns there."""
     return 1 + (owned & 1) + (owned >> 1)

@@ -128,9 +128,15 @@ def audited(solver: Solver, steps: int, every: int = 5, audit: Audit | None = No
 
 
 def nodes(solver: Solver) -> np.ndarray:
-    """Copy of all node values (nx + 3, ny + 3, nz + 3, 8), ghosts included: velocity, mass, acceleration, filling."""
+    """Copy of all node values (nx + 3, ny + 3, nz + 3, 8), ghosts included, at a step's start: see `Grid.start`."""
+    return node_array(solver, "start")
+
+
+def node_array(solver: Solver, name: str) -> np.ndarray:
+    """Copy of a nodal array of the grid (nx + 3, ny + 3, nz + 3, lanes), ghosts included."""
     shape = tuple(n + 3 for n in solver.model.scene.domain.cells)
-    return solver.state.grid.node.numpy().copy().reshape(*shape, 8)
+    values = getattr(solver.state.grid, name).numpy()
+    return values[: np.prod(shape)].reshape(*shape, -1).copy()
 
 
 def cell_content(solver: Solver) -> np.ndarray:
@@ -150,13 +156,13 @@ def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:
         Node sums (nx + 3, ny + 3, nz + 3, 8), momentum, mass, force, volume, and sum w V p (nx + 3, ...), in double.
     """
     state, model = solver.state, solver.model
-    state.grid.node.zero_()
+    state.grid.sums.zero_()
     state.grid.field.zero_()
-    state.grid.content.zero_()
+    state.grid.content_sums.zero_()
     kernel = transfer.scatter_kernel(model.shape, True, True, model.affine, model.damped)
     inputs = [state.particles, state.grid, state.clock, model.charges[0].half_width, model.scene.ambient_pressure, 0]
     wp.launch(kernel, state.count, inputs=inputs, device=state.device)
-    sums = nodes(solver).astype(np.float64)
+    sums = node_array(solver, "sums").astype(np.float64)
     return sums, state.grid.field.numpy()[: sums[..., 0].size, 0].reshape(sums.shape[:3]).astype(np.float64)
 
 

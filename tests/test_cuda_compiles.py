@@ -3,7 +3,7 @@
 import pytest
 import warp as wp
 
-from warp_mpm.kernels import eikonal, gauges, grid, material, reduce, shape, sharpen, strain, surface, transfer
+from warp_mpm.kernels import eikonal, fold, gauges, grid, material, reduce, reproject, shape, strain, surface, transfer
 from warp_mpm.kernels.burn.programmed import ProgrammedBurn
 from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
@@ -15,18 +15,18 @@ ARCHITECTURE = 75  # the oldest that current Warp supports
 
 KERNELS = {
     "scatter": lambda: transfer.scatter_kernel(shape.BSPLINE, True, True, False, True),
-    "advance": lambda: transfer.advance_kernel(shape.BSPLINE, False, False, True, True),
+    "advance": lambda: transfer.advance_kernel(shape.BSPLINE, False, False, True),
     "update": lambda: material.update_kernel(
         shape.BSPLINE, strain.Strain.REPROJECTED, True, True, IdealGas, ProgrammedBurn
     ),
     "update_jwl": lambda: material.update_kernel(
         shape.BSPLINE, strain.Strain.REPROJECTED, True, True, JWL, ProgrammedCompressionBurn, MieGruneisen
     ),
-    "clear": grid.clear_kernel,
-    "solve": lambda: grid.solve_kernel(True, True, True),
-    "solve_reprojected": lambda: grid.solve_reprojected_kernel(True, True),
-    "sharpen_acceleration": sharpen.sharpen_acceleration_kernel,
-    "sharpen_velocity": sharpen.sharpen_velocity_kernel,
+    "fold": lambda: fold.fold_kernel(True, True),
+    "solve": lambda: grid.solve_kernel(True, True, True, True),
+    "fold_reprojected": fold.fold_reprojected_kernel,
+    "solve_reprojected": lambda: reproject.solve_reprojected_kernel(True, True),
+    "clear": reproject.clear_kernel,
     "start_step": lambda: reduce.start_step,
     "record_gauges": lambda: gauges.record_gauges,
     "eikonal": lambda: eikonal.spread,

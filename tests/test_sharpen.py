@@ -5,18 +5,19 @@ walls by the method of images, on a grid unfolded at its walls.
 
 The kernels run on fields of our own, in every node, and are compared for the same single precision inputs. `FORMULA`
 bounds their round-off relative to the largest value: six differences of up to twice that, weighted, summed up, times
-s^2 / 2 = 1/8, and the node's own value make at most 16 roundings of it.
+s^2 / 2 = 1/8, and the node's own value make at most 16 roundings of it. (That values are quotients of sums adds one.)
 """
 
 import numpy as np
 import pytest
 import warp as wp
-from scenes_for_tests import CELL, OPEN, ROUND_OFF, STICK, advance, block, inert_gas, nodes, particle_values, start
+from scenes_for_tests import CELL, OPEN, ROUND_OFF, STICK, advance, block, inert_gas, node_array, particle_values, start
 
 from warp_mpm.config import Save, ShapeFunction, Transfer
+from warp_mpm.kernels.grid import solve_kernel
 from warp_mpm.kernels.node_pass import Phase
+from warp_mpm.kernels.reproject import solve_reprojected_kernel
 from warp_mpm.kernels.shape import BSPLINE, SHAPES
-from warp_mpm.kernels.sharpen import sharpen_acceleration_kernel, sharpen_velocity_kernel
 from warp_mpm.kernels.walls import REACTIONS
 from warp_mpm.scene import Wall, Walls
 from warp_mpm.simulation import simulate
@@ -30,12 +31,11 @@ ENDS_OPEN = Walls(x_low=Wall.OPEN, x_high=Wall.OPEN)
 EXACT = 1e-6  # of sums over particles, relative; see `test_conservation.py`
 SMALLEST = 1e-4  # of the masses, in the largest
 
-# What is sharpened, by which kernel, and where it stands in `node` and `kick`.
-ACCELERATION = (sharpen_acceleration_kernel, slice(4, 7))
-MOTION = (sharpen_velocity_kernel, slice(0, 3))
-WORK = (sharpen_velocity_kernel, slice(4, 7))
+DT = 2.0**-20  # [s]; a power of two, so that dt a is exact
 
-phases = pytest.mark.parametrize("phase", [ACCELERATION, MOTION, WORK], ids=["acceleration", "motion", "work"])
+ACCELERATION, MOTION, WORK = "acceleration", "motion", "work"  # what is sharpened
+
+phases = pytest.mark.parametrize("phase", [ACCELERATION, MOTION, WORK])
 grids = pytest.mark.parametrize(
     ("walls", "cells"),
     [
@@ -130,10 +130,13 @@ def single(values):
 
 
 def grid_of(walls, cells, device):
-    """A solver whose kernels work on all nodes; none has been sharpened."""
+    """A solver whose kernels work on all nodes, in steps of DT; none has been sharpened."""
     solver = start(block(cells, walls=walls), device)
-    solver.state.reactions.zero_()
-    solver.state.grid.stamps.fill_(int(solver.state.clock_values()["step"]) - 1)
+    state = solver.state
+    state.reactions.zero_()
+    clock = state.clock.numpy().copy()
+    clock["dt"] = DT
+    state.clock.assign(clock)
     return solver
 
 
@@ -152,24 +155,34 @@ def random_values(walls, mass, seed=2):
 def by_kernel(solver, walls, mass, x, phase, ghost_mass=0.0):
     """Sharpened values of all nodes, ghosts too, in double; `x` (..., 3) and `mass` (..., 1) are of own nodes."""
     state, model = solver.state, solver.model
-    make_kernel, lanes = phase
-    accelerations = make_kernel is sharpen_acceleration_kernel
-    node = nodes(solver)
-    kick = np.full_like(node, 5.0)  # what is not read
-    node[..., 3] = ghost_mass
-    node[(*own_nodes(walls), 3)] = mass[..., 0]
-    source, target = (node, state.grid.kick) if accelerations else (kick, state.grid.node)
-    kick[..., [3, 7]] = node[..., [3, 7]]
-    source[..., lanes] = with_ghosts(walls, unfold(walls, x, odd_components(walls)))
-    state.grid.node.assign(node.reshape(-1, 8))
-    state.grid.kick.assign(kick.reshape(-1, 8))
+    own = own_nodes(walls)
+    sums, begin, reprojected = (np.zeros_like(node_array(solver, name)) for name in ("sums", "start", "reprojected"))
+    sums[..., 3] = ghost_mass
+    sums[(*own, 3)] = begin[(*own, 3)] = mass[..., 0]
+    begin[(*own, 7)] = np.where(mass[..., 0] > state.grid.light_mass, 1.0 / mass[..., 0], 0.0)
+    if phase is ACCELERATION:
+        sums[(*own, slice(4, 7))] = mass * x
+    elif phase is MOTION:
+        begin[(*own, slice(0, 3))] = 0.75 * x
+        begin[(*own, slice(4, 7))] = 0.25 / DT * x
+    else:
+        begin[(*own, slice(0, 3))] = x
+        reprojected[(*own, slice(0, 3))] = mass * x
+    for name, values in {"sums": sums, "start": begin, "reprojected": reprojected}.items():
+        array = getattr(state.grid, name)
+        flat = values.reshape(-1, values.shape[-1])
+        array.assign(np.pad(flat, ((0, len(array) - len(flat)), (0, 0))))
     what = Phase()
-    what.strength, what.reactions = STRENGTH, state.reactions
+    what.strength, what.reactions, what.peaks = STRENGTH, state.reactions, state.peaks
+    step = int(state.clock_values()["step"])
+    at_start = phase is ACCELERATION
+    kernel = solve_kernel(True, False, True, False) if at_start else solve_reprojected_kernel(True, True)
+    state.grid.stamps.fill_(step if at_start else step - 1)
     inputs = [state.grid, model.boundary, state.clock, what, 0, 0]
-    wp.launch(make_kernel(), state.blocks * state.grid.workers, inputs=inputs, device=state.device)
-    kept = slice(None) if accelerations else [3, 7]
-    np.testing.assert_array_equal(nodes(solver)[..., kept], node[..., kept])
-    return target.numpy().reshape(node.shape)[..., lanes].astype(np.float64)
+    wp.launch(kernel, state.blocks * state.grid.workers, inputs=inputs, device=state.device)
+    np.testing.assert_array_equal(node_array(solver, "sums"), sums if at_start else np.zeros_like(sums))
+    result = node_array(solver, "start" if at_start else "end").astype(np.float64)
+    return result[..., 0:3] if phase is MOTION else result[..., 4:7]
 
 
 def assert_equal(actual, wanted, x):
@@ -245,11 +258,11 @@ def test_a_wave_is_strengthened_by_its_factor(modes, phase, device):
 
 @phases
 def test_constant_and_linear_fields_stay(phase, device):
-    """A constant field stays bit by bit on any masses, a linear one in the inside of a uniform material."""
+    """A constant field stays on any masses, a linear one in the inside of a uniform material."""
     solver = grid_of(OPEN, CELLS, device)
     mass = random_mass(OPEN, CELLS)
     constant = np.broadcast_to(single(np.array([300.0, -20.0, 0.1])), (*mass.shape[:3], 3))
-    np.testing.assert_array_equal(by_kernel(solver, OPEN, mass, constant, phase), constant)
+    assert_equal(by_kernel(solver, OPEN, mass, constant, phase), constant, constant)
     place = np.stack(np.meshgrid(*(np.arange(n + 3.0) for n in CELLS), indexing="ij"), axis=-1)
     linear = single(place @ np.array([[1.0, -2.0, 3.0], [0.5, 4.0, -1.0], [-3.0, 0.2, 2.0]]))
     actual = by_kernel(solver, OPEN, np.full_like(mass, single(np.array(1e-3))), linear, phase)
@@ -350,18 +363,17 @@ SPREADS = {ShapeFunction.LINEAR: 0.0, ShapeFunction.GIMP: 3 / 16, ShapeFunction.
 def test_a_step_sharpens_with_the_damping_alone(shape, transfer, device):
     """From rest, accelerated by a wave, particles move by dt^2 sum w a; with the damping, times its factor squared.
 
-    One factor is the acceleration's, one the velocity's; nothing is stored or done for plain FLIP, nor for tents,
-    whose forces jump. Places within a cell are rounded to 2^-25 of it, and the ways, of 0.1 cells, by less.
+    One factor is the acceleration's, one the velocity's; nothing is done for plain FLIP, nor for tents, whose forces
+    jump. Places within a cell are rounded to 2^-25 of it, and the ways, of 0.1 cells, by less.
     """
     cells, mode = (3, 8, 2), 3
     solver = start(block(cells, material=inert_gas(1000.0), walls=ENDS_OPEN), device, shape=shape, transfer=transfer)
-    sharpened = transfer is Transfer.DAMPED_FLIP and SPREADS[shape] > 0.0
-    assert (len(solver.state.grid.kick) > 0) == sharpened
     angle = np.pi * mode / cells[1]
-    node = nodes(solver)
-    node[..., 4:7] = 0.0
-    node[..., 4] = 5e6 * np.cos(angle * np.arange(-1, cells[1] + 2))[:, None]
-    solver.state.grid.node.assign(node.reshape(-1, 8))
+    sums = node_array(solver, "sums")
+    sums[..., 4:7] = 0.0
+    sums[..., 4] = sums[..., 3] * (5e6 * np.cos(angle * np.arange(-1, cells[1] + 2))[:, None])
+    solver.state.grid.sums.assign(sums.reshape(-1, 8))
+    dict(solver.phases())["solve grid"]()
     before = particle_values(solver.state)
     after = particle_values(advance(solver, 1).state)
     place = before["position"][:, 1] / CELL

@@ -24,7 +24,7 @@ from warp_mpm.state import NO_STEP, PARTICLE_ARRAYS, State
 Arrays = Mapping[str, np.ndarray]
 
 ACCOUNTS = ("clock", "maxima", "tallies", "reactions", "pending_impulses", "impulses", "peaks")  # of a State
-NODAL_ARRAYS = ("node", "field", "content")  # of a Grid; between two steps the others are empty
+NODAL_ARRAYS = ("sums", "field", "content", "start")  # of a Grid; between two steps the others hold nothing of use
 BLOCKS, SORTING, RANGES = "grid.blocks", "sorting", "ranges"
 MINUTE = 60.0  # [s]
 
@@ -137,7 +137,7 @@ def saved_solver(solver: Solver) -> dict[str, np.ndarray]:
     arrays |= {f"state.{name}": getattr(state, name).numpy().copy() for name in ACCOUNTS}
     blocks = _active_blocks(state)
     nodes = _nodes_of_blocks(state, blocks)
-    arrays |= {f"grid.{name}": getattr(state.grid, name).numpy()[nodes] for name in NODAL_ARRAYS}
+    arrays |= {f"grid.{name}": array.numpy()[nodes] for name, array in _nodal_arrays(state).items()}
     arrays[BLOCKS] = blocks.astype(np.int32)
     arrays[RANGES] = np.array(state.ranges)
     arrays[SORTING] = np.array([solver.steps_since_sort, solver.thin], dtype=np.int32)
@@ -168,8 +168,8 @@ def _restore_grid(state: State, arrays: Arrays) -> None:
         raise ValueError("blocks outside the grid")
     stamps = state.grid.stamps.numpy().copy()
     empty, nodes = (_nodes_of_blocks(state, of) for of in (np.flatnonzero(stamps != NO_STEP), blocks))
-    for name in NODAL_ARRAYS:
-        array, saved = getattr(state.grid, name), arrays[f"grid.{name}"]
+    for name, array in _nodal_arrays(state).items():
+        saved = arrays[f"grid.{name}"]
         values = array.numpy()  # on a CPU a view, of which only these nodes are touched: empty space takes no memory
         if saved.shape != (len(nodes), *values.shape[1:]) or saved.dtype != values.dtype:
             raise ValueError(f"grid.{name}: {saved.dtype}{saved.shape}")
@@ -195,6 +195,12 @@ def _check_particles(state: State, arrays: Arrays) -> None:
     begin, count = (ranges[..., 0], ranges[..., 1]) if ranges.shape == shape else (-np.ones(1), np.ones(1))
     if np.any(begin < 0) or np.any(count < 0) or np.any(begin + count > state.count):
         raise ValueError("ranges beyond the particles")
+
+
+def _nodal_arrays(state: State) -> dict[str, wp.array]:
+    """What the grid keeps between two steps, by name; not every solver has all of it."""
+    arrays = {name: getattr(state.grid, name) for name in NODAL_ARRAYS}
+    return {name: array for name, array in arrays.items() if len(array) > 0}
 
 
 def _active_blocks(state: State) -> np.ndarray:

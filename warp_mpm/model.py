@@ -101,6 +101,11 @@ class Model:
         return self.scene.ambient_pressure if Wall.OPEN in self.scene.walls.faces() else 0.0
 
     @property
+    def has_walls(self) -> bool:
+        """Whether any face of the domain is a wall."""
+        return any(wall is not Wall.OPEN for wall in self.scene.walls.faces())
+
+    @property
     def damped(self) -> bool:
         """Whether the conservative damping acts."""
         return self.config.transfer is Transfer.DAMPED_FLIP

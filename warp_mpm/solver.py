@@ -14,7 +14,7 @@ import warp as wp
 
 from warp_mpm.config import Order
 from warp_mpm.kernels import grid as grid_kernels
-from warp_mpm.kernels import material, motion, reduce, sharpen, transfer
+from warp_mpm.kernels import fold, material, motion, reduce, reproject, transfer
 from warp_mpm.kernels.blocks import NODES
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
 from warp_mpm.kernels.node_pass import Phase
@@ -60,18 +60,18 @@ class Solver:
         if self.model.config.order is Order.USF:
             yield from self._phases_of_usf()
             return
+        musl = self.model.config.order is Order.MUSL
         yield "time step", self._start_step.launch
-        if self.model.sharpened:
-            yield "sharpen accelerations", lambda: self._over_nodes(self._sharpen_acceleration)
         yield "collect reactions", self._collect_reactions.launch
         yield "grid to particles and back", lambda: self._over_slabs(self._advance)
-        if self.model.config.order is Order.MUSL:
+        if musl:
+            yield "fold re-projection", lambda: self._over_walls(self._fold_reprojected)
             yield "solve re-projection", lambda: self._over_nodes(self._solve_reprojected)
-        if self.model.sharpened:
-            yield "sharpen velocities", lambda: self._over_nodes(self._sharpen_velocity)
         yield "strain and material", lambda: self._over_particles(self._update)
-        yield "clear", lambda: self._over_nodes(self._clear)
+        if not musl:
+            yield "clear", lambda: self._over_nodes(self._clear)
         yield "particles to grid", lambda: self._over_slabs(self._scatter_all)
+        yield "fold grid", lambda: self._over_walls(self._fold_all)
         yield "solve grid", lambda: self._over_nodes(self._solve_all)
         yield "end of step", self._end_step.launch
 
@@ -79,10 +79,12 @@ class Solver:
         yield "time step", self._start_step.launch
         yield "clear", lambda: self._over_nodes(self._clear)
         yield "momentum to grid", lambda: self._over_slabs(self._scatter_momentum)
+        yield "fold momentum", lambda: self._over_walls(self._fold_momentum)
         yield "solve momentum", lambda: self._over_nodes(self._solve_momentum)
         yield "strain and material", lambda: self._over_particles(self._update)
         yield "forces to grid", lambda: self._over_slabs(self._scatter_force)
-        yield "solve forces", lambda: self._over_nodes(self._solve_force)
+        yield "fold forces", lambda: self._over_walls(self._fold_force)
+        yield "solve forces", lambda: self._over_nodes(self._solve_all)
         yield "collect reactions", self._collect_reactions.launch
         yield "grid to particles", lambda: self._over_slabs(self._advance)
         yield "motion", lambda: self._over_particles(self._move)
@@ -135,8 +137,8 @@ class Solver:
                 ],
                 device=model.device,
             )
-        self._over_nodes(self._clear)
         self._over_slabs(self._scatter_all)
+        self._over_walls(self._fold_all)
         self._over_nodes(self._solve_all)
         if any(charge.velocities is not None for charge in model.scene.charges):
             kernel = initial_strain_kernel(model.shape)
@@ -159,6 +161,11 @@ class Solver:
     def _over_nodes(self, tasks: list[Task]) -> None:
         """Work on nodes."""
         self.launcher.run(tasks, NODES * self.state.blocks)
+
+    def _over_walls(self, tasks: list[Task]) -> None:
+        """Work on the nodes at walls."""
+        if self.model.has_walls:
+            self._over_nodes(tasks)
 
     def _groups(self) -> Iterator[tuple[int, ChargeModel, int, int]]:
         """Slab, charge, first particle and number of particles of each group that has any."""
@@ -200,7 +207,7 @@ class Solver:
                 lambda slab, charge: (kernel, [state.particles, state.grid, state.clock, charge.half_width, ambient])
             )
 
-        advance = transfer.advance_kernel(shape, blend, model.affine, musl, model.sharpened, thin)
+        advance = transfer.advance_kernel(shape, blend, model.affine, musl, thin)
         self._advance = self._per_slab(
             lambda slab, charge: (
                 advance,
@@ -247,19 +254,22 @@ class Solver:
         phase.strength = 0.5 * model.shape.spread
         phase.reactions, phase.impulses, phase.peaks = state.reactions, state.pending_impulses, state.peaks
         reprojection = Phase()
-        reprojection.impulses = state.impulses
+        reprojection.strength, reprojection.impulses = phase.strength, state.impulses
+        order, damped, sharpened = model.config.order, model.damped, model.sharpened
 
-        self._clear = self._per_slot(grid_kernels.clear_kernel(), phase)
-        self._solve_all = self._per_slot(grid_kernels.solve_kernel(True, True, model.damped), phase)
-        if model.config.order is Order.USF:
-            self._solve_momentum = self._per_slot(grid_kernels.solve_kernel(True, False, model.damped), phase)
-            self._solve_force = self._per_slot(grid_kernels.solve_kernel(False, True, model.damped), phase)
-        self._solve_reprojected = self._per_slot(
-            grid_kernels.solve_reprojected_kernel(model.sharpened, model.damped), reprojection
-        )
-        if model.sharpened:
-            self._sharpen_acceleration = self._per_slot(sharpen.sharpen_acceleration_kernel(), phase)
-            self._sharpen_velocity = self._per_slot(sharpen.sharpen_velocity_kernel(), phase)
+        musl = order is Order.MUSL
+        self._fold_all = self._per_slot(fold.fold_kernel(True, True), phase)
+        self._solve_all = self._per_slot(grid_kernels.solve_kernel(True, damped, sharpened, musl), phase)
+        if musl:
+            self._fold_reprojected = self._per_slot(fold.fold_reprojected_kernel(), reprojection)
+            kernel = reproject.solve_reprojected_kernel(sharpened, damped)
+            self._solve_reprojected = self._per_slot(kernel, reprojection)
+        else:
+            self._clear = self._per_slot(reproject.clear_kernel(), phase)
+        if order is Order.USF:
+            self._fold_momentum = self._per_slot(fold.fold_kernel(True, False), phase)
+            self._fold_force = self._per_slot(fold.fold_kernel(False, True), phase)
+            self._solve_momentum = self._per_slot(grid_kernels.solve_kernel(False, damped, sharpened, False), phase)
 
     def _per_slab(self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]]) -> list[Task]:
         """One task for each slab, with one recorded launch for each charge that has particles there."""

@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 
 from warp_mpm.arrival_times import light_particles
+from warp_mpm.config import Order
 from warp_mpm.kernels import grid, order
 from warp_mpm.kernels.blocks import EDGE, NODES
 from warp_mpm.kernels.precision import LAST_FRACTION, NEVER, matrix3, scalar, vector2, vector3, vector4, vector8
@@ -170,13 +171,17 @@ class State:
 
     def field_density(self) -> np.ndarray:
         """Density at the nodes of the domain (nx + 1, ny + 1, nz + 1) [kg/m3]."""
-        density = wp.zeros(tuple(n + 1 for n in self.model.scene.domain.cells), dtype=scalar, device=self.device)
-        wp.launch(grid.measure_density, density.shape, inputs=[self.grid, density], device=self.device)
-        return density.numpy()
+        return self._measured(grid.measure_density, scalar)
 
     def field_velocity(self) -> np.ndarray:
-        """Velocity at the nodes of the domain (nx + 1, ny + 1, nz + 1, 3) [m/s], 0 at empty ones; a view on a CPU."""
-        return self._in_the_domain(self.grid.node)[..., :3]
+        """Velocity at the nodes of the domain (nx + 1, ny + 1, nz + 1, 3) [m/s], 0 at empty ones."""
+        return self._measured(grid.measure_velocity, vector3)
+
+    def _measured(self, kernel: wp.Kernel, dtype: Any) -> np.ndarray:
+        """What a kernel measures at the nodes of the domain."""
+        values = wp.zeros(tuple(n + 1 for n in self.model.scene.domain.cells), dtype=dtype, device=self.device)
+        wp.launch(kernel, values.shape, inputs=[self.grid, values], device=self.device)
+        return values.numpy()
 
     def _in_the_domain(self, nodal: wp.array) -> np.ndarray:
         """What a nodal array holds at the nodes of the domain."""
@@ -190,7 +195,8 @@ def memory_needed(model: Model) -> int:
     records = sum(record.numpy_dtype()["itemsize"] for record in RECORDS.values())
     affine = 9 * NUMBER.itemsize if model.affine else 0
     particle = records + affine + 4 + 26  # its index; the keys and the scratch of the sort
-    node = (8 + 2 + 2 + 4 + (8 if model.sharpened else 0)) * NUMBER.itemsize
+    musl = model.config.order is Order.MUSL
+    node = (8 + 8 + 2 + (2 * 2 if model.damped else 0) + (4 + 8 + 4 if musl else 0)) * NUMBER.itemsize
     nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
     return int(model.scene.particle_count * particle + nodes * node)
 
@@ -200,11 +206,16 @@ def _allocate_grid(model: Model) -> Grid:
     counts = [n + 3 for n in cells]
     total = counts[0] * counts[1] * counts[2]
     grid = Grid()
-    grid.node = _sparse_zeros(total, vector8, model.device)
-    grid.field = _sparse_zeros(total + 1, vector2, model.device)  # see `kernels/rows.py`: one node to spare
-    grid.content = _sparse_zeros(total, vector2, model.device)
-    grid.reprojected = _sparse_zeros(total + 1, vector4, model.device)  # likewise
-    grid.kick = _sparse_zeros(total if model.sharpened else 0, vector8, model.device)
+    reprojected = total if model.config.order is Order.MUSL else 0
+    spare = 1  # see `kernels/rows.py`
+    grid.sums = _sparse_zeros(total, vector8, model.device)
+    grid.field = _sparse_zeros(total + spare, vector2, model.device)
+    grid.content_sums = _sparse_zeros(total if model.damped else 0, vector2, model.device)
+    grid.content = _sparse_zeros(total if model.damped else 0, vector2, model.device)
+    grid.start = _sparse_zeros(total, vector8, model.device)
+    grid.reprojected = _sparse_zeros(reprojected + spare, vector4, model.device)
+    grid.end = _sparse_zeros(reprojected, vector8, model.device)
+    grid.damping = _sparse_zeros(reprojected + spare, vector4, model.device)
     blocks = [-(-n // EDGE) for n in counts]
     grid.stamps = wp.full(blocks[0] * blocks[1] * blocks[2], NO_STEP, dtype=int, device=model.device)
     grid.blocks = wp.vec3i(*blocks)
