@@ -47,14 +47,18 @@ def is_active(grid: Grid, block: int, step: int) -> bool:
 
 
 @wp.func
-def node_of_block(grid: Grid, block: int, n: int) -> wp.vec3i:
-    """Node number n (0 to 63) of a block, as (i, j, k)."""
+def lowest_node_of(grid: Grid, block: int) -> wp.vec3i:
+    """The lowest node of a block, as (i, j, k)."""
     row = block // grid.blocks[2]
     return wp.vec3i(
-        (row // grid.blocks[1]) * EDGE + n // 16 - 1,
-        (row % grid.blocks[1]) * EDGE + n // 4 % 4 - 1,
-        (block % grid.blocks[2]) * EDGE + n % 4 - 1,
+        (row // grid.blocks[1]) * EDGE - 1, (row % grid.blocks[1]) * EDGE - 1, (block % grid.blocks[2]) * EDGE - 1
     )
+
+
+@wp.func
+def node_of_block(lowest: wp.vec3i, n: int) -> wp.vec3i:
+    """Node number n (0 to 63) of the block whose lowest node is given, as (i, j, k)."""
+    return lowest + wp.vec3i(n >> 4, (n >> 2) & 3, n & 3)
 
 
 @wp.func

@@ -12,8 +12,8 @@ from warp_mpm.kernels.content import inside, solve_cell, stands_for_itself
 from warp_mpm.kernels.neighbours import acceleration_excess_function
 from warp_mpm.kernels.node_pass import Phase, inverse_mass, node_kernel
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector2, vector3, vector4, vector8
-from warp_mpm.kernels.records import Clock, Grid, node_index, raise_maximum
-from warp_mpm.kernels.sharpen import acceleration_of, excess_function, mass_along, tally_sharpening, twice
+from warp_mpm.kernels.records import Clock, Grid, index_of_node, node_index, raise_maximum
+from warp_mpm.kernels.sharpen import acceleration_of, excess_function, scattered_mass, tally_sharpening, twice
 from warp_mpm.kernels.vectors import first_three, second_three
 from warp_mpm.kernels.walls import (
     Boundary,
@@ -65,7 +65,7 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
     What is to be `reprojected` is emptied. Tallies what walls do to the sharpening. The highest pressure of nodes at
     least half filled inside the domain goes to `peaks`.
     """
-    excess = excess_function(acceleration_of, mass_along)
+    excess = excess_function(acceleration_of, scattered_mass)
     excess_inside = acceleration_excess_function()
 
     @wp.func
@@ -91,7 +91,7 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
         a = vector3()
         owned = ghost_sides(boundary, grid.cells, index)
         if wp.static(force):
-            a = second_three(acceleration_of(grid, boundary, index, ZERO))
+            a = second_three(acceleration_of(grid, boundary, n, ZERO))
             grid.field[n] = field_at(grid, phase, slot, index, sums, inverse)
         if wp.static(force and sharpened) and inverse > ZERO:
             pulled = phase.strength * second_three(excess(grid, boundary, index, ZERO))
@@ -156,9 +156,7 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
 @wp.func
 def filling_of(grid: Grid, n: int) -> scalar:
     """Filling of a node by its flat index: its particles' volume over its own."""
-    in_plane = n % grid.stride_x
-    index = wp.vec3i(n // grid.stride_x - 1, in_plane // grid.stride_y - 1, in_plane % grid.stride_y - 1)
-    return grid.sums[n][7] / node_volume(grid, index)
+    return grid.sums[n][7] / node_volume(grid, index_of_node(grid, n))
 
 
 @wp.func

@@ -8,7 +8,7 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.blocks import EDGE, NODES, is_active, node_of_block, on_grid
+from warp_mpm.kernels.blocks import EDGE, NODES, is_active, lowest_node_of, node_of_block, on_grid
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 from warp_mpm.kernels.records import Clock, Grid, node_index
 from warp_mpm.kernels.walls import Boundary
@@ -78,7 +78,7 @@ def node_kernel(
         block = begin + thread // grid.workers
         now = clock[0]
         if is_active(grid, block, now.step - wp.static(age)):
-            lowest = node_of_block(grid, block, 0)
+            lowest = lowest_node_of(grid, block)
             if lies_inside(grid, lowest):
                 if wp.static(goes_inside):
                     first = node_index(grid, lowest[0], lowest[1], lowest[2])
@@ -87,18 +87,18 @@ def node_kernel(
                         visit_inside(grid, boundary, now, phase, slot, node)
             else:
                 for n in range(thread % grid.workers, NODES, grid.workers):
-                    index = node_of_block(grid, block, n)
+                    index = node_of_block(lowest, n)
                     if has_no_face_near(grid, index):
                         if wp.static(goes_inside):
                             node = node_index(grid, index[0], index[1], index[2])
                             visit_inside(grid, boundary, now, phase, slot, node)
                     elif on_grid(grid, index):
                         visit(grid, boundary, now, phase, slot, index)
-        if wp.static(retires):
-            if is_active(grid, block, now.step - wp.static(age + 1)):
-                for n in range(thread % grid.workers, NODES, grid.workers):
-                    index = node_of_block(grid, block, n)
-                    if on_grid(grid, index):
-                        retire(grid, node_index(grid, index[0], index[1], index[2]))
+        if wp.static(retires) and is_active(grid, block, now.step - wp.static(age + 1)):
+            lowest = lowest_node_of(grid, block)
+            for n in range(thread % grid.workers, NODES, grid.workers):
+                index = node_of_block(lowest, n)
+                if on_grid(grid, index):
+                    retire(grid, node_index(grid, index[0], index[1], index[2]))
 
     return over_nodes

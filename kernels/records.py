@@ -70,7 +70,8 @@ class Particles:
 class Grid:
     """The background grid. Sums are scattered to, and emptied by the pass that has read them last; the rest is written
     for all nodes of active blocks before it is read. What is scattered at the end of a step stays until the next one
-    has used it: outputs read the sums and the field."""
+    has used it: outputs read the sums and the field.
+    """
 
     sums: wp.array(dtype=vector8)  # momentum, mass | force, volume, as they were scattered
     field: wp.array(dtype=vector2)  # sums of w V p [J] and w m c^2 [J] -> field pressure [Pa], sound speed [m/s]
@@ -154,3 +155,10 @@ def raise_maxima(maxima: wp.array(dtype=Maxima), slab: int, values: Maxima):
 def node_index(grid: Grid, i: int, j: int, k: int) -> int:
     """Flat index of node (i, j, k), each from -1 to cells + 1."""
     return (i + 1) * grid.stride_x + (j + 1) * grid.stride_y + k + 1
+
+
+@wp.func
+def index_of_node(grid: Grid, n: int) -> wp.vec3i:
+    """The node (i, j, k) of a flat index."""
+    in_plane = n % grid.stride_x
+    return wp.vec3i(n // grid.stride_x - 1, in_plane // grid.stride_y - 1, in_plane % grid.stride_y - 1)

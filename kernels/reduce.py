@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_mpm.kernels.blocks import NODES, is_active, node_of_block, on_grid
+from warp_mpm.kernels.blocks import NODES, is_active, lowest_node_of, node_of_block, on_grid
 from warp_mpm.kernels.precision import HALF, ZERO, scalar, vector3
 from warp_mpm.kernels.records import (
     DISPLACEMENT,
@@ -152,7 +152,8 @@ def audit_grid(grid: Grid, boundary: Boundary, clock: wp.array(dtype=Clock), sum
     thread = wp.tid()
     block = thread // grid.workers
     if is_active(grid, block, clock[0].step):
+        lowest = lowest_node_of(grid, block)
         for n in range(thread % grid.workers, NODES, grid.workers):
-            index = node_of_block(grid, block, n)
+            index = node_of_block(lowest, n)
             if on_grid(grid, index) and is_owner(boundary, grid.cells, index):
                 wp.atomic_add(sums, 0, wp.float64(grid.sums[node_index(grid, index[0], index[1], index[2])][3]))

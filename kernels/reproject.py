@@ -11,7 +11,7 @@ from warp_mpm.kernels.neighbours import velocity_excess_function
 from warp_mpm.kernels.node_pass import Phase, damped_share, node_kernel
 from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, scalar, vector2, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index
-from warp_mpm.kernels.sharpen import excess_function, start_mass_along, twice, velocities_of
+from warp_mpm.kernels.sharpen import excess_function, mass_at_start, twice, velocities_of
 from warp_mpm.kernels.vectors import first_three, multiply_add8, second_three
 from warp_mpm.kernels.walls import (
     Boundary,
@@ -56,7 +56,7 @@ def solve_reprojected_kernel(sharpened: bool, damped: bool) -> wp.Kernel:
     And the two velocities of the step, sharpened if asked for: v^n + dt a, which moves the particles, and the mean
     (v^n + v_r) / 2, which does the work.
     """
-    excess = excess_function(velocities_of, start_mass_along)
+    excess = excess_function(velocities_of, mass_at_start)
     excess_inside = velocity_excess_function()
 
     @wp.func

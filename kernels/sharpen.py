@@ -24,7 +24,7 @@ import warp as wp
 
 from warp_mpm.kernels.node_pass import Phase, inverse_mass
 from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, scalar, vector3, vector8
-from warp_mpm.kernels.records import Clock, Grid, node_index
+from warp_mpm.kernels.records import Grid, index_of_node, node_index
 from warp_mpm.kernels.vectors import first_three, multiply_add8, second_three
 from warp_mpm.kernels.walls import (
     WALL_OPEN,
@@ -39,51 +39,50 @@ from warp_mpm.kernels.walls import (
 
 
 @wp.func
-def mass_along(grid: Grid, boundary: Boundary, index: wp.vec3i, axis: int) -> scalar:
-    """Mass of a node as its neighbours along an axis see it [kg]: on a wall with that of the mirror image."""
-    mass = grid.sums[node_index(grid, index[0], index[1], index[2])][3]
-    return wp.where(wall_on(boundary, grid.cells, axis, index[axis]) == WALL_OPEN, mass, TWO * mass)
+def scattered_mass(grid: Grid, n: int) -> scalar:
+    """Mass of a node [kg], by its flat index."""
+    return grid.sums[n][3]
 
 
 @wp.func
-def start_mass_along(grid: Grid, boundary: Boundary, index: wp.vec3i, axis: int) -> scalar:
+def mass_at_start(grid: Grid, n: int) -> scalar:
     """The same, once the sums of the scatter are being emptied."""
-    mass = grid.start[node_index(grid, index[0], index[1], index[2])][3]
-    return wp.where(wall_on(boundary, grid.cells, axis, index[axis]) == WALL_OPEN, mass, TWO * mass)
+    return grid.start[n][3]
 
 
 @wp.func
-def neighbour(grid: Grid, boundary: Boundary, index: wp.vec3i, axis: int, side: int) -> wp.vec3i:
-    """The next node along an axis, side -1 or 1; the node itself where there is none but its mirror image."""
-    other = wp.vec3i(index[0], index[1], index[2])
-    at = index[axis] + side
-    low = wp.where(boundary.wall[2 * axis] == WALL_OPEN, -1, 0)
-    high = wp.where(boundary.wall[2 * axis + 1] == WALL_OPEN, grid.cells[axis] + 1, grid.cells[axis])
-    if at >= low and at <= high:
-        other[axis] = at
-    return other
-
-
-@wp.func
-def acceleration_of(grid: Grid, boundary: Boundary, index: wp.vec3i, dt: scalar) -> vector8:
+def acceleration_of(grid: Grid, boundary: Boundary, n: int, dt: scalar) -> vector8:
     """Acceleration of a node, from its sums, in lanes 4 to 6; nothing else, and nothing where it counts as empty."""
-    sums = grid.sums[node_index(grid, index[0], index[1], index[2])]
+    sums = grid.sums[n]
     inverse = inverse_mass(grid, sums[3])
-    a = vector3()
-    if inverse > ZERO:
-        a = inverse * second_three(sums) + wp.cw_mul(free_components(boundary, grid.cells, index), boundary.gravity)
+    a = inverse * second_three(sums)
+    if inverse > ZERO and wp.dot(boundary.gravity, boundary.gravity) > ZERO:
+        a += wp.cw_mul(free_components(boundary, grid.cells, index_of_node(grid, n)), boundary.gravity)
     return vector8(ZERO, ZERO, ZERO, ZERO, a[0], a[1], a[2], ZERO)
 
 
 @wp.func
-def velocities_of(grid: Grid, boundary: Boundary, index: wp.vec3i, dt: scalar) -> vector8:
+def velocities_of(grid: Grid, boundary: Boundary, n: int, dt: scalar) -> vector8:
     """Velocities of a node that move the particles, lanes 0 to 2, and do the work, lanes 4 to 6; nothing else."""
-    n = node_index(grid, index[0], index[1], index[2])
     start = grid.start[n]
     v = first_three(start)
     moving = v + dt * second_three(start)
     work = HALF * (v + start[7] * first_three(grid.reprojected[n]))
     return vector8(moving[0], moving[1], moving[2], ZERO, work[0], work[1], work[2], ZERO)
+
+
+@wp.func
+def exists(grid: Grid, boundary: Boundary, axis: int, at: int) -> bool:
+    """Whether there are nodes at a place along an axis that are no mirror images."""
+    low = wp.where(boundary.wall[2 * axis] == WALL_OPEN, -1, 0)
+    high = wp.where(boundary.wall[2 * axis + 1] == WALL_OPEN, grid.cells[axis] + 1, grid.cells[axis])
+    return at >= low and at <= high
+
+
+@wp.func
+def weight_at(grid: Grid, boundary: Boundary, axis: int, at: int) -> scalar:
+    """By how much a node's mass counts along an axis: on a wall twice, with that of its mirror image."""
+    return wp.where(wall_on(boundary, grid.cells, axis, at) == WALL_OPEN, ONE, TWO)
 
 
 @functools.cache
@@ -92,14 +91,19 @@ def excess_function(value_of: wp.Function, mass_of: wp.Function) -> wp.Function:
 
     @wp.func
     def excess(grid: Grid, boundary: Boundary, index: wp.vec3i, dt: scalar) -> vector8:
-        value = value_of(grid, boundary, index, dt)
+        n = node_index(grid, index[0], index[1], index[2])
+        value = value_of(grid, boundary, n, dt)
+        mass = mass_of(grid, n)
+        strides = wp.vec3i(grid.stride_x, grid.stride_y, 1)
         total = vector8()
         for axis in range(3):
-            mass = mass_of(grid, boundary, index, axis)
+            own = weight_at(grid, boundary, axis, index[axis]) * mass
             for side in range(-1, 2, 2):
-                other = neighbour(grid, boundary, index, axis, side)
-                link = wp.min(mass, mass_of(grid, boundary, other, axis))
-                total = multiply_add8(total, link, value - value_of(grid, boundary, other, dt))
+                at = index[axis] + side
+                if exists(grid, boundary, axis, at):
+                    m = n + side * strides[axis]
+                    link = wp.min(own, weight_at(grid, boundary, axis, at) * mass_of(grid, m))
+                    total = multiply_add8(total, link, value - value_of(grid, boundary, m, dt))
         return total
 
     return excess
