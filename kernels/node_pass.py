@@ -94,11 +94,12 @@ def node_kernel(
                             visit_inside(grid, boundary, now, phase, slot, node)
                     elif on_grid(grid, index):
                         visit(grid, boundary, now, phase, slot, index)
-        if wp.static(retires) and is_active(grid, block, now.step - wp.static(age + 1)):
-            lowest = lowest_node_of(grid, block)
-            for n in range(thread % grid.workers, NODES, grid.workers):
-                index = node_of_block(lowest, n)
-                if on_grid(grid, index):
-                    retire(grid, node_index(grid, index[0], index[1], index[2]))
+        if wp.static(retires):
+            if is_active(grid, block, now.step - wp.static(age + 1)):
+                lowest = lowest_node_of(grid, block)
+                for n in range(thread % grid.workers, NODES, grid.workers):
+                    index = node_of_block(lowest, n)
+                    if on_grid(grid, index):
+                        retire(grid, node_index(grid, index[0], index[1], index[2]))
 
     return over_nodes
