@@ -10,7 +10,14 @@ import warp as wp
 
 from warp_mpm.kernels.content import inside, solve_cell, stands_for_itself
 from warp_mpm.kernels.neighbours import acceleration_excess_function
-from warp_mpm.kernels.node_pass import Phase, inverse_mass, node_kernel
+from warp_mpm.kernels.node_pass import (
+    Phase,
+    inverse_mass,
+    node_kernel,
+    prefetch_eight,
+    prefetch_four,
+    prefetch_two,
+)
 from warp_mpm.kernels.precision import HALF, ONE, ZERO, scalar, vector2, vector3, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, index_of_node, node_index, raise_maximum
 from warp_mpm.kernels.sharpen import acceleration_of, excess_function, scattered_mass, tally_sharpening, twice
@@ -48,6 +55,17 @@ def occupied_volume(grid: Grid, index: wp.vec3i, filling: scalar) -> scalar:
     """
     share = inside(filling)
     return node_volume(grid, index) * (share * filling + ONE - share)
+
+
+@wp.func
+def look_ahead(grid: Grid, n: int):
+    """Ask for a row of what is solved."""
+    prefetch_eight(grid.sums, n)
+    prefetch_eight(grid.start, n)
+    prefetch_four(grid.reprojected, n)
+    prefetch_two(grid.field, n)
+    prefetch_two(grid.content, n)
+    prefetch_two(grid.content_sums, n)
 
 
 @wp.func
@@ -150,7 +168,7 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
         if wp.static(reprojects):
             grid.reprojected[n] = vector4()
 
-    return node_kernel(visit, visit_inside, 0, forget)
+    return node_kernel(visit, visit_inside, 0, look_ahead, forget)
 
 
 @wp.func

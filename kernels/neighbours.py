@@ -21,6 +21,15 @@ _VECTORS = f"""
     auto plus = [](half sum, half x, {REAL} weight) {{ return __builtin_elementwise_fma(x, (half)weight, sum); }};
     auto minus = [](half x, half y) {{ return x - y; }};
     auto add = [](half x, half y) {{ return x + y; }};
+    auto inverse = [](half masses, {REAL} light) {{  // without a branch, and all divisions at once
+        auto counts = masses > light;
+        half inverses = 1 / masses;
+        auto bits = counts;
+        __builtin_memcpy(&bits, &inverses, sizeof(bits));
+        bits &= counts;
+        __builtin_memcpy(&inverses, &bits, sizeof(bits));
+        return inverses;
+    }};
 """
 
 _PLAIN = f"""
@@ -28,6 +37,12 @@ _PLAIN = f"""
     auto plus = [](half sum, half x, {REAL} weight) {{ return wp::add(sum, wp::mul(x, weight)); }};
     auto minus = [](half x, half y) {{ return wp::sub(x, y); }};
     auto add = [](half x, half y) {{ return wp::add(x, y); }};
+    auto inverse = [](half masses, {REAL} light) {{
+        half inverses;
+        for (int k = 0; k < 4; ++k)
+            inverses[k] = masses[k] > light ? 1 / masses[k] : 0;
+        return inverses;
+    }};
 """
 
 _SHARED = f"""
@@ -39,17 +54,15 @@ _SHARED = f"""
 # Lanes of the sums: momentum, mass | force, volume.
 _ACCELERATIONS = """
     typedef __typeof__(sums.data[0][3]) number;
-    number mass[8], inverse[8];
+    half masses[2] = {};
     for (int k = 0; k < 7; ++k)
-        mass[k] = sums.data[at[k]][3];
-    mass[7] = 1;
-    for (int k = 0; k < 8; ++k)  // all at once, without a branch
-        inverse[k] = (mass[k] > light_mass ? number(1) : number(0)) / (mass[k] > light_mass ? mass[k] : number(1));
-    half here = plus(half{}, high(sums.data + n), inverse[6]), along[3] = {}, total;
-    for (int k = 0; k < 6; ++k) {
-        half there = plus(half{}, high(sums.data + at[k]), inverse[k]);
-        along[k / 2] = plus(along[k / 2], minus(here, there), mass[k] < mass[6] ? mass[k] : mass[6]);
-    }
+        masses[k / 4][k % 4] = sums.data[at[k]][3];
+    const half inverses[2] = {inverse(masses[0], light_mass), inverse(masses[1], light_mass)};
+    auto mass = [&](int k) { return masses[k / 4][k % 4]; };
+    auto acceleration = [&](int k) { return plus(half{}, high(sums.data + at[k]), inverses[k / 4][k % 4]); };
+    half here = acceleration(6), along[3] = {}, total;
+    for (int k = 0; k < 6; ++k)
+        along[k / 2] = plus(along[k / 2], minus(here, acceleration(k)), mass(k) < mass(6) ? mass(k) : mass(6));
     total = add(add(along[0], along[1]), along[2]);
     total[3] = 0;
     wp::vec_t<4, number> result;

@@ -11,7 +11,13 @@ import warp as wp
 from warp_mpm.kernels.blocks import EDGE, NODES, is_active, lowest_node_of, node_of_block, on_grid
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 from warp_mpm.kernels.records import Clock, Grid, node_index
+from warp_mpm.kernels.stencil import prefetch_row_function
 from warp_mpm.kernels.walls import Boundary
+
+# Of a row of a block, by its first node.
+prefetch_eight = prefetch_row_function(EDGE, 8)
+prefetch_four = prefetch_row_function(EDGE, 4)
+prefetch_two = prefetch_row_function(EDGE, 2)
 
 
 @wp.struct
@@ -61,16 +67,21 @@ def damped_share(now: Clock, sound_speed: scalar) -> scalar:
 
 @functools.cache
 def node_kernel(
-    visit: wp.Function, visit_inside: wp.Function | None, age: int, retire: wp.Function | None = None
+    visit: wp.Function,
+    visit_inside: wp.Function | None,
+    age: int,
+    look_ahead: wp.Function | None = None,
+    retire: wp.Function | None = None,
 ) -> wp.Kernel:
     """Kernel over the blocks that were scattered to `age` steps ago, from `begin` on.
 
     visit(grid, boundary, now, phase, slot, index) and visit_inside(grid, boundary, now, phase, slot, n), with the
     clock's values `now`, a node's `index` (i, j, k) and its flat index n. Without `visit_inside` there is nothing to do
-    for nodes that have no face near. With `retire`, retire(grid, n) is for the nodes of blocks that were last scattered
-    to a step before that.
+    for nodes that have no face near. `look_ahead(grid, n)` asks for a row of the next block, n its first node: thin gas
+    keeps a pass waiting for memory, and row by row a CPU does both, waits and works; a whole block's rows asked for at
+    once are too many for it. `retire(grid, n)` is for nodes of blocks that were last scattered to a step before that.
     """
-    goes_inside, retires = visit_inside is not None, retire is not None
+    goes_inside, looks_ahead, retires = visit_inside is not None, look_ahead is not None, retire is not None
 
     @wp.kernel(enable_backward=False, module="unique")
     def over_nodes(grid: Grid, boundary: Boundary, clock: wp.array(dtype=Clock), phase: Phase, slot: int, begin: int):
@@ -84,6 +95,9 @@ def node_kernel(
                     first = node_index(grid, lowest[0], lowest[1], lowest[2])
                     for n in range(thread % grid.workers, NODES, grid.workers):
                         node = first + (n >> 4) * grid.stride_x + ((n >> 2) & 3) * grid.stride_y + (n & 3)
+                        if wp.static(looks_ahead):
+                            if (n & (EDGE - 1)) == 0:
+                                look_ahead(grid, node + EDGE)
                         visit_inside(grid, boundary, now, phase, slot, node)
             else:
                 for n in range(thread % grid.workers, NODES, grid.workers):

@@ -8,7 +8,7 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.neighbours import velocity_excess_function
-from warp_mpm.kernels.node_pass import Phase, damped_share, node_kernel
+from warp_mpm.kernels.node_pass import Phase, damped_share, node_kernel, prefetch_eight, prefetch_four, prefetch_two
 from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, scalar, vector2, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index
 from warp_mpm.kernels.sharpen import excess_function, mass_at_start, twice, velocities_of
@@ -30,6 +30,17 @@ def empty(grid: Grid, n: int):
     """Empty what particles scatter to at the end of a step."""
     grid.sums[n] = vector8()
     grid.field[n] = vector2()
+
+
+@wp.func
+def look_ahead(grid: Grid, n: int):
+    """Ask for a row of what is solved."""
+    prefetch_eight(grid.start, n)
+    prefetch_four(grid.reprojected, n)
+    prefetch_two(grid.field, n)
+    prefetch_eight(grid.end, n)
+    prefetch_four(grid.damping, n)
+    prefetch_eight(grid.sums, n)
 
 
 @wp.func
@@ -114,4 +125,4 @@ def solve_reprojected_kernel(sharpened: bool, damped: bool) -> wp.Kernel:
         grid.damping[n] = damping_of(start, total, alpha)
         empty(grid, n)
 
-    return node_kernel(visit, visit_inside, 1)
+    return node_kernel(visit, visit_inside, 1, look_ahead)

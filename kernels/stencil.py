@@ -130,18 +130,21 @@ def _scatter_gradient(row: Row) -> str:
 """
 
 
-def _prefetch(width: int) -> str:
+def _prefetch_row(width: int) -> str:
     return f"""
-#if defined(__clang__) && !defined(__CUDACC__)
-    for (int i = 0; i < {width}; ++i)
-        for (int j = 0; j < {width}; ++j) {{
-            const char* row = (const char*)(nodes.data + (size_t)(first + i * stride_x + j * stride_y));
+            const char* row = (const char*)at;
             __builtin_prefetch(row, 1);
             const size_t size = {width} * sizeof(nodes.data[0]);
             for (size_t byte = 64; byte + 64 < size; byte += 64)  // cache lines between the first and the last
                 __builtin_prefetch(row + byte, 1);
             __builtin_prefetch(row + size - 1, 1);
-        }}
+"""
+
+
+def _on_a_cpu(body: str) -> str:
+    return f"""
+#if defined(__clang__) && !defined(__CUDACC__)
+{body}
 #endif
 """
 
@@ -226,8 +229,27 @@ def scatter_gradient_function(width: int, lanes: int, plain: bool = False) -> wp
 def prefetch_function(width: int, lanes: int) -> wp.Function:
     """Device function (nodes, first, stride_x, stride_y): ask for the rows of a stencil, by its lowest node."""
     value_type = value_type_of(lanes)
+    body = f"""
+    for (int i = 0; i < {width}; ++i)
+        for (int j = 0; j < {width}; ++j) {{
+            auto* at = nodes.data + (size_t)(first + i * stride_x + j * stride_y);
+{_prefetch_row(width)}
+        }}
+"""
 
-    @wp.func_native(_prefetch(width))
+    @wp.func_native(_on_a_cpu(body))
     def prefetch(nodes: wp.array(dtype=value_type), first: int, stride_x: int, stride_y: int): ...
 
     return prefetch
+
+
+@functools.cache
+def prefetch_row_function(width: int, lanes: int) -> wp.Function:
+    """Device function (nodes, first): ask for one row, by its first node."""
+    value_type = value_type_of(lanes)
+    body = f"            auto* at = nodes.data + (size_t)first;{_prefetch_row(width)}"
+
+    @wp.func_native(_on_a_cpu(body))
+    def prefetch_row(nodes: wp.array(dtype=value_type), first: int): ...
+
+    return prefetch_row

@@ -23,7 +23,7 @@ from warp_mpm.kernels.stencil import (
 )
 from warp_mpm.kernels.vectors import at_rest_if_slow, first_three, second_three
 
-AHEAD = wp.constant(6)  # places in memory to the particle whose nodes are asked for
+AHEAD = wp.constant(12)  # places in memory to the particle whose nodes are asked for
 
 
 @functools.cache
@@ -81,6 +81,7 @@ def look_ahead_function(shape: Shape, what: Ahead) -> wp.Function:
     prefetch = prefetch_function(shape.width, 8)
     prefetch_four = prefetch_function(shape.width, 4)
     prefetch_two = prefetch_function(shape.width, 2)
+    prefetch_cells = prefetch_function(2, 2)
     start = what in (Ahead.START, Ahead.START_AND_REPROJECTED)
     reprojected = what is Ahead.START_AND_REPROJECTED
     end, sums = what is Ahead.END, what is Ahead.SUMS
@@ -97,10 +98,11 @@ def look_ahead_function(shape: Shape, what: Ahead) -> wp.Function:
         if wp.static(end):
             prefetch(grid.end, first, grid.stride_x, grid.stride_y)
             prefetch_four(grid.damping, first, grid.stride_x, grid.stride_y)
+            prefetch_cells(grid.content, first, grid.stride_x, grid.stride_y)
         if wp.static(sums):
             prefetch(grid.sums, first, grid.stride_x, grid.stride_y)
             prefetch_two(grid.field, first, grid.stride_x, grid.stride_y)
-            prefetch_two(grid.content_sums, first, grid.stride_x, grid.stride_y)
+            prefetch_cells(grid.content_sums, first, grid.stride_x, grid.stride_y)
 
     return look_ahead
 
