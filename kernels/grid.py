@@ -68,12 +68,6 @@ def look_ahead(grid: Grid, n: int):
     prefetch_two(grid.content_sums, n)
 
 
-@wp.func
-def forget(grid: Grid, n: int):
-    """A node that no particle reaches any more; its neighbours may still look at it."""
-    grid.start[n] = vector8()
-
-
 @functools.cache
 def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) -> wp.Kernel:
     """Sums of the scatter -> the start of a step: v = P / M, a = f / M + g, sharpened if asked for; the field pressure,
@@ -138,12 +132,15 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
     def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
         sums = grid.sums[n]
         mass = sums[3]
+        per_volume = grid.inverse_spacing[0] * grid.inverse_spacing[1] * grid.inverse_spacing[2]
+        if wp.static(cells):  # narrow shapes reach cells without the node of their index
+            grid.content[n] = per_volume * grid.content_sums[n]
+            grid.content_sums[n] = vector2()
         if mass == ZERO:
             grid.start[n] = vector8()
-            if wp.static(cells):
-                grid.content[n] = vector2()
+            if sums[4] != ZERO or sums[5] != ZERO or sums[6] != ZERO:
+                grid.sums[n] = vector8()  # linear shapes push at nodes where they have no weight
             return
-        per_volume = grid.inverse_spacing[0] * grid.inverse_spacing[1] * grid.inverse_spacing[2]
         inverse = inverse_mass(grid, mass)
         v = inverse * first_three(sums)
         a = vector3()
@@ -162,9 +159,13 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
             if filling >= HALF:
                 raise_maximum(phase.peaks, slot, pressure)
         grid.start[n] = vector8(v[0], v[1], v[2], mass, a[0], a[1], a[2], inverse)
-        if wp.static(cells):
-            grid.content[n] = per_volume * grid.content_sums[n]
-            grid.content_sums[n] = vector2()
+        if wp.static(reprojects):
+            grid.reprojected[n] = vector4()
+
+    @wp.func
+    def forget(grid: Grid, n: int):
+        """A node that no particle reaches any more: neighbours may still look at it, a wall's fold at a ghost."""
+        grid.start[n] = vector8()
         if wp.static(reprojects):
             grid.reprojected[n] = vector4()
 

@@ -46,6 +46,7 @@ _PLAIN = f"""
 """
 
 _SHARED = f"""
+    typedef {REAL} number;
     auto low = [](const void* node) {{ half x; memcpy(&x, node, sizeof(x)); return x; }};
     auto high = [](const void* node) {{ half x; memcpy(&x, ({REAL}*)node + 4, sizeof(x)); return x; }};
     const int at[7] = {{n - stride_x, n + stride_x, n - stride_y, n + stride_y, n - 1, n + 1, n}};
@@ -53,7 +54,6 @@ _SHARED = f"""
 
 # Lanes of the sums: momentum, mass | force, volume.
 _ACCELERATIONS = """
-    typedef __typeof__(sums.data[0][3]) number;
     half masses[2] = {};
     for (int k = 0; k < 7; ++k)
         masses[k / 4][k % 4] = sums.data[at[k]][3];

@@ -175,7 +175,7 @@ def _restore_grid(state: State, arrays: Arrays) -> None:
             raise ValueError(f"grid.{name}: {saved.dtype}{saved.shape}")
         values[empty] = 0
         values[nodes] = saved
-        if array.device.is_cuda:
+        if state.device.is_cuda:
             array.assign(values)
     stamps[:] = NO_STEP
     stamps[blocks] = step
