@@ -15,6 +15,7 @@ from warp_mpm.detonators import Detonator, PointDetonator
 from warp_mpm.errors import InputError
 from warp_mpm.geometry import Box
 from warp_mpm.kernels import transfer
+from warp_mpm.kernels.blocks import EDGE
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.kernels.eos.jwl import JWL
 from warp_mpm.kernels.precision import DIGITS
@@ -142,11 +143,22 @@ def node_array(solver: Solver, name: str) -> np.ndarray:
 def cell_content(solver: Solver) -> np.ndarray:
     """Copy of what all cells hold (nx + 3, ny + 3, nz + 3, 2), ghosts included, in double: pressure [Pa] and filling.
 
-    Unsolved, after a scatter alone, sum L V p [J] and sum L V [m3]. Cell (i, j, k) of the domain is at
-    [i + 1, j + 1, k + 1]; the last layer along every axis is no cell.
+    Cell (i, j, k) of the domain is at [i + 1, j + 1, k + 1]; the last layer along every axis is no cell.
     """
-    shape = tuple(n + 3 for n in solver.model.scene.domain.cells)
-    return solver.state.grid.content.numpy().reshape(*shape, 2).astype(np.float64)
+    return node_array(solver, "content").astype(np.float64)
+
+
+def cell_sums(solver: Solver) -> np.ndarray:
+    """The same after a scatter alone, unsolved: sum L V p [J] and sum L V [m3]."""
+    return node_array(solver, "content_sums").astype(np.float64)
+
+
+def active_nodes(solver: Solver) -> np.ndarray:
+    """Whether each node (nx + 3, ny + 3, nz + 3) is in a block that the last scatter reached."""
+    grid = solver.state.grid
+    active = grid.stamps.numpy().reshape(tuple(grid.blocks)) == int(solver.state.clock_values()["step"])
+    places = np.indices([n + 3 for n in solver.model.scene.domain.cells]) // EDGE
+    return active[tuple(places)]
 
 
 def scatter(solver: Solver) -> tuple[np.ndarray, np.ndarray]:

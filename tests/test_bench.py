@@ -1,6 +1,7 @@
 """The benchmark command: its files, keys and counts on tiny cubes. No time is asserted, only that times add up."""
 
 import importlib
+import itertools
 import json
 import math
 import sys
@@ -9,12 +10,13 @@ from unittest.mock import Mock
 
 import pytest
 import warp as wp
-from scenes_for_tests import ORDERS_AND_TRANSFERS
+from scenes_for_tests import ORDERS_AND_TRANSFERS, block
 
-from warp_mpm.config import ShapeFunction, SolverConfig
+from warp_mpm.config import Order, ShapeFunction, SolverConfig, Transfer
 from warp_mpm.errors import InputError
 from warp_mpm.launch import Launcher, find_device
 from warp_mpm.model import build_model
+from warp_mpm.scene import Wall, Walls
 from warp_mpm.solver import Solver
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))  # the benchmark is a program beside the package
@@ -65,8 +67,8 @@ def figures(value, key=""):
         yield key, value
 
 
-def model_of(**config):
-    return build_model(runs.cube(4), SolverConfig(**config), find_device("cpu"))
+def model_of(cells=4, **config):
+    return build_model(runs.cube(cells), SolverConfig(**config), find_device("cpu"))
 
 
 def test_every_section_reports_finite_figures_with_units(report):
@@ -85,7 +87,7 @@ def test_medians_lie_between_the_lowest_and_the_highest(report):
 
 
 def test_what_is_reported_follows_the_counts(report):
-    found = counts.phase_counts(model_of())
+    found = counts.phase_counts(model_of(TINY.cells))
     nodes = report["phases"]["nodes_per_particle"]
     (column,), (limit,) = report["phases"]["columns"], report["limits"]
     rows = {row["phase"]: row for row in column["phases"]}
@@ -113,8 +115,48 @@ def test_counts_by_hand():
     assert count["grid to particles and back"].particle_bytes == 18 + 4 * 7
     assert count["grid to particles and back"].node_bytes == 4 * (8 + 2 * 4)
     assert count["grid to particles and back"].particle_operations == 8 * (27 + 9 + 3) + 4 * (27 + 3) + 36 + 6
-    assert count["clear"].node_bytes == 4 * (8 + 2 + 2 + 4 + 8)
+    # Sums and field in, start and field out, the re-projected sums emptied; the cells' in, out and emptied.
+    assert count["solve grid"].node_bytes == 4 * (8 + 2 + 8 + 2 + 4 + 3 * 2)
+    # Seven divisions and products of four, six times a minimum, a difference and a product; two sums, one product.
+    assert count["solve grid"].node_operations == counts.SOLVING + 7 * 5 + 6 * 9 + 12
+    # Start, re-projected sums and field in; velocities and damping out; sums and field emptied.
+    assert count["solve re-projection"].node_bytes == 4 * (8 + 4 + 2 + 8 + 4 + 8 + 2)
+    # Two values of four lanes, twice as many differences and products, a minimum and its half.
+    assert count["solve re-projection"].node_operations == counts.SOLVING + 7 * 8 + 6 * 18 + 2 * 12
+    assert "clear" not in count
     assert count["time step"] == counts.Count()
+
+
+def test_counts_of_undamped_orders_by_hand():
+    """Nothing is sharpened, cells hold nothing; USL and USF empty sums and field in a pass of its own."""
+    musl, usl, usf = (
+        counts.phase_counts(model_of(order=order, transfer=Transfer.FLIP))
+        for order in (Order.MUSL, Order.USL, Order.USF)
+    )
+    assert musl["solve grid"].node_bytes == 4 * (8 + 2 + 8 + 2 + 4)
+    assert usl["solve grid"].node_bytes == 4 * (8 + 2 + 8 + 2)
+    assert usl["solve grid"].node_operations == musl["solve re-projection"].node_operations == counts.SOLVING
+    assert usl["clear"] == usf["clear"] == counts.Count(node_bytes=4 * (8 + 2))
+    assert usf["fold momentum"].node_bytes < usf["fold forces"].node_bytes == usl["fold grid"].node_bytes
+
+
+@pytest.mark.parametrize("walls", [Walls(), Walls(Wall.OPEN, Wall.STICK, Wall.SLIP, Wall.OPEN), Walls.all(Wall.OPEN)])
+@pytest.mark.parametrize("cells", [(1, 2, 3), (6, 5, 4)])
+def test_folds_are_counted_where_walls_are(cells, walls):
+    """By counting the nodes one by one: on a wall or next to it, and ghosts; no walls, nothing."""
+    model = build_model(block(cells, walls=walls), SolverConfig(), find_device("cpu"))
+    ends = [(axis, side, face) for face, (axis, side) in enumerate(itertools.product(range(3), range(2)))]
+    walled = [(axis, side) for axis, side, face in ends if walls.faces()[face] is not Wall.OPEN]
+    kinds = []
+    for node in itertools.product(*(range(-1, n + 2) for n in cells)):
+        before = [cells[axis] - node[axis] if side else node[axis] for axis, side in walled]  # nodes to each wall
+        kinds.append("ghost" if min(before, default=2) < 0 else "owner" if min(before, default=2) < 2 else "apart")
+    owners, ghosts = (kinds.count(kind) / len(kinds) for kind in ("owner", "ghost"))
+    count = counts.phase_counts(model)
+    assert count["fold grid"].node_bytes == pytest.approx(4 * (owners * 2 + ghosts) * (8 + 2))
+    assert count["fold re-projection"].node_bytes == pytest.approx(4 * (owners * (2 * 4 + 2) + ghosts * (4 + 2)))
+    assert count["fold grid"].node_operations == pytest.approx(owners * counts.FOLDING)
+    assert (count["fold grid"].node_bytes > 0.0) == model.has_walls
 
 
 @pytest.mark.parametrize("width", [2, 3])

@@ -100,12 +100,13 @@ def test_fields_between_nodes(device, sheared):
     pressure, values = np.full(shape, 1e12), np.full((*shape, 8), 1e12)
     inside = (slice(1, -1),) * 3
     pressure[inside] = linear(nodes, 1e9, [1e9, 2e9, -3e9])
-    values[(*inside, slice(0, 3))] = nodes @ velocities + [100.0, 0.0, -50.0]
-    values[(*inside, 3)] = linear(nodes, 1000.0, densities) * CELL**3 * share
-    values[(*inside, 7)] = 1.0
+    mass = linear(nodes, 1000.0, densities) * CELL**3 * share
+    values[(*inside, slice(0, 3))] = mass[..., None] * (nodes @ velocities + [100.0, 0.0, -50.0])
+    values[(*inside, 3)] = mass
+    values[(*inside, 7)] = CELL**3 * share
     field = np.stack([pressure.ravel(), np.zeros(pressure.size)], axis=1)
     solver.state.grid.field.assign(np.append(field, [[0.0, 0.0]], axis=0).astype(np.float32))
-    solver.state.grid.node.assign(values.reshape(-1, 8).astype(np.float32))
+    solver.state.grid.sums.assign(values.reshape(-1, 8).astype(np.float32))
     recorder.record()
     gauges = recorder.result().gauges.values()
     tolerance = 32 * ROUND_OFF

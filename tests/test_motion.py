@@ -102,9 +102,9 @@ def test_a_particle_that_leaves_its_reach_stops_the_run(device):
     """Nodes that run away take a particle along: the error says which, where and when, and no array is overrun."""
     solver = start(block((6, 4, 3)), device)
     state = solver.state
-    values = state.grid.node.numpy().copy()
+    values = state.grid.start.numpy().copy()
     values[:, 0] = 1e9  # [m/s]
-    state.grid.node.assign(values)
+    state.grid.start.assign(values)
     solver.step()
     with pytest.raises(SimulationError) as caught:
         check_state(state, 1)

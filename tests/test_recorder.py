@@ -9,7 +9,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes_for_tests import CELL, OPEN, ROUND_OFF, advance, block, inert_gas, nodes, particle_values, scatter, start
+from scenes_for_tests import (
+    CELL,
+    OPEN,
+    ROUND_OFF,
+    advance,
+    block,
+    inert_gas,
+    node_array,
+    particle_values,
+    scatter,
+    start,
+)
 
 from warp_mpm import recorder as recorder_module
 from warp_mpm.builder import SceneBuilder
@@ -17,17 +28,23 @@ from warp_mpm.detonators import PointDetonator
 from warp_mpm.geometry import Box
 from warp_mpm.materials import ammonium_nitrate
 from warp_mpm.recorder import Recorder, nodes_near_point, nodes_near_segment
-from warp_mpm.scene import Domain, SectionPlane, Segment
+from warp_mpm.scene import Domain, SectionPlane, Segment, Wall, Walls
 from warp_mpm.section import section_pressure
 from warp_mpm.state import NUMBER
 
 DOMAIN = Domain((-0.01, 0.0, 0.0), (0.09, 0.06, 0.02), (10, 4, 2))  # cells of 10 x 15 x 10 mm
 
 
-def node_volumes(cells):
-    """Each node's share of the domain (nx + 1, ny + 1, nz + 1), in cells: halved on every face."""
-    x, y, z = (np.where((np.arange(n + 1) == 0) | (np.arange(n + 1) == n), 0.5, 1.0) for n in cells)
-    return x[:, None, None] * y[:, None] * z
+def node_volumes(domain):
+    """Each node's share of the domain (nx + 1, ny + 1, nz + 1) [m3]: halved on every face; rounded as the grid's is."""
+    x, y, z = (np.where((np.arange(n + 1) == 0) | (np.arange(n + 1) == n), 0.5, 1.0) for n in domain.cells)
+    return x[:, None, None] * y[:, None] * z * np.prod(np.array(domain.spacing, dtype=NUMBER))
+
+
+def fillings(solver):
+    """Filling of the nodes of the domain, from the sums of the last scatter."""
+    volume = node_array(solver, "sums")[1:-1, 1:-1, 1:-1, 7].astype(np.float64)
+    return volume / node_volumes(solver.model.scene.domain)
 
 
 def folded(sums):
@@ -40,6 +57,21 @@ def folded(sums):
     return sums[1:-1, 1:-1, 1:-1]
 
 
+def folded_momentum(momentum, wall):
+    """The same of momenta (nx + 3, ..., 3): a slip wall reverses and holds what is normal to it, a stick wall all."""
+    for axis in range(3):
+        momentum = np.moveaxis(momentum, axis, 0).copy()
+        held = [axis] if wall is Wall.SLIP else [0, 1, 2]
+        signs = np.ones(3)
+        signs[held] = -1.0
+        momentum[2] += signs * momentum[0]
+        momentum[-3] += signs * momentum[-1]
+        for on_wall in (momentum[1], momentum[-2]):
+            on_wall[..., held] = 0.0
+        momentum = np.moveaxis(momentum, 0, axis)
+    return momentum[1:-1, 1:-1, 1:-1]
+
+
 @pytest.mark.parametrize("free", [False, True], ids=["closed", "free"])
 def test_field_pressure(free, device):
     """The formula, from the sums of a scatter: ghosts folded in a closed box; nodes of a free block partly filled."""
@@ -48,12 +80,12 @@ def test_field_pressure(free, device):
     state = solver.state
     state.peaks.zero_()
     advance(solver, 1)
-    computed, filling = state.field_pressure().astype(np.float64), nodes(solver)[1:-1, 1:-1, 1:-1, 7]
+    computed, filling = state.field_pressure().astype(np.float64), fillings(solver)
     peak = float(state.peaks.numpy().max())
     sums, work = scatter(solver)
     volume = sums[..., 7]
     work, volume = (s[1:-1, 1:-1, 1:-1] if free else folded(s) for s in (work, volume))
-    share = node_volumes(scene.domain.cells) * CELL**3
+    share = node_volumes(scene.domain)
     inside = np.clip((volume / share - 0.80) / 0.15, 0.0, 1.0)
     expected = work / (inside * volume + (1.0 - inside) * share)
     np.testing.assert_allclose(computed, expected, rtol=0, atol=32 * ROUND_OFF * expected.max())
@@ -62,6 +94,28 @@ def test_field_pressure(free, device):
     assert (filling.min() < 0.5) == free
     assert free or filling.max() > 1.0
     assert np.any((inside > 0.0) & (inside < 1.0) & (expected > 0.0)) == free
+
+
+@pytest.mark.parametrize("wall", list(Wall), ids=lambda wall: wall.value)
+def test_field_velocity(wall, device):
+    """Momentum over mass of a scatter, to the round-off of its sums; at empty nodes and where walls hold it, just 0."""
+    margins = 2 if wall is Wall.OPEN else 0
+    solver = advance(start(block((5, 4, 3), walls=Walls.all(wall), margin_cells=margins), device), 16)
+    computed = solver.state.field_velocity().astype(np.float64)
+    sums, _ = scatter(solver)
+    # Sizes, besides: a component of a velocity is a mean of the particles', some of which may cancel.
+    fastest = np.abs(particle_values(solver.state)["velocity"]).max()
+    if wall is Wall.OPEN:
+        mass, momentum = sums[1:-1, 1:-1, 1:-1, 3], sums[1:-1, 1:-1, 1:-1, 0:3]
+    else:
+        mass, momentum = folded(sums[..., 3]), folded_momentum(sums[..., 0:3], wall)
+    counted = mass > solver.state.grid.light_mass
+    expected = np.divide(momentum, mass[..., None], out=np.zeros_like(momentum), where=counted[..., None])
+    np.testing.assert_allclose(computed, expected, rtol=0, atol=32 * ROUND_OFF * fastest)
+    assert not computed[expected == 0.0].any()
+    assert np.abs(expected).max() > 0.1 * fastest
+    assert counted.all() == (wall is not Wall.OPEN)
+    assert np.any(expected == 0.0)
 
 
 def test_peaks_leave_out_nodes_less_than_half_filled(device):
@@ -75,7 +129,7 @@ def test_peaks_leave_out_nodes_less_than_half_filled(device):
         state.assign("energy", energy.astype(np.float32))
 
     solver = start(block((7, 4, 3), material=inert_gas(1000.0, 1e6), walls=OPEN), device, prepare=heat_one_end)
-    pressure, filling = solver.state.field_pressure(), nodes(solver)[1:-1, 1:-1, 1:-1, 7]
+    pressure, filling = solver.state.field_pressure(), fillings(solver)
     peak = solver.state.peaks.numpy().max()
     assert peak == pressure[filling >= 0.5].max()
     assert pressure.max() > 1.5 * peak
@@ -100,11 +154,11 @@ def fill_grid(state, pressure, filling):
     shape = tuple(n + 3 for n in DOMAIN.cells)
     pressures, values = np.full(shape, 1e12), np.zeros((*shape, 8))
     inside = (slice(1, -1),) * 3
-    pressures[inside], values[(*inside, 7)] = pressure, filling
+    pressures[inside], values[(*inside, 7)] = pressure, filling * node_volumes(DOMAIN)
     field = np.zeros((pressures.size + 1, 2), dtype=NUMBER)  # it has a node to spare
     field[:-1, 0] = pressures.ravel()
     state.grid.field.assign(field)
-    state.grid.node.assign(values.reshape(-1, 8).astype(NUMBER))
+    state.grid.sums.assign(values.reshape(-1, 8).astype(NUMBER))
 
 
 def node_places():

@@ -27,7 +27,7 @@ from warp_mpm.config import Transfer
 from warp_mpm.kernels import relaxation
 from warp_mpm.kernels.content import FILLING, PRESSURE
 from warp_mpm.kernels.eos import evaluate
-from warp_mpm.kernels.precision import scalar
+from warp_mpm.kernels.precision import scalar, vector2
 from warp_mpm.material_library import water
 from warp_mpm.materials import Material
 
@@ -165,9 +165,11 @@ def test_who_takes_part_in_making_room(device):
 
 
 def shake(state):
-    """Random velocities, so that a step strains the material."""
+    """Random velocities, so that a step strains the material; cells to hold something, which not every grid has."""
     velocity = np.random.default_rng(4).normal(0.0, 100.0, (state.count, 3))
     state.assign("velocity", velocity.astype(np.float32))
+    if len(state.grid.content) == 0:
+        state.grid.content = wp.zeros(len(state.grid.start), dtype=vector2, device=state.device)
 
 
 def step_from(scene, device, content, **config):

@@ -18,7 +18,7 @@ from scenes_for_tests import (
     OPEN,
     ROUND_OFF,
     block,
-    cell_content,
+    cell_sums,
     inert_gas,
     nodes,
     particle_values,
@@ -79,13 +79,22 @@ def domain_parts(domain):
     return domain.lower, domain.spacing, domain.cells
 
 
-def set_nodes(solver, velocity, acceleration=None, alpha=0.0):
-    """Give the nodes velocities and accelerations (n, 3), and shares alpha of the damping (n); masses stay."""
-    values = solver.state.grid.node.numpy().copy()
+def set_nodes(solver, velocity, acceleration=None):
+    """Give the nodes velocities and accelerations (n, 3) at the start of a step; masses stay."""
+    values = solver.state.grid.start.numpy().copy()
     values[:, 0:3] = velocity
     values[:, 4:7] = 0.0 if acceleration is None else acceleration
-    values[:, 7] = alpha
-    solver.state.grid.node.assign(values)
+    solver.state.grid.start.assign(values)
+
+
+def set_end(solver, moving, working, alpha, reprojected, heat):
+    """Give the nodes the velocities of a step (n, 3), and its damping: alpha (n), v_r or alpha v_r (n, 3), heat."""
+    count = len(moving)
+    mass = np.full(count, np.nan)  # nobody's business
+    end = np.concatenate([moving, mass[:, None], working, alpha[:, None]], axis=1)
+    damping = np.concatenate([reprojected, np.full((count, 1), heat)], axis=1)
+    solver.state.grid.end.assign(end.astype(np.float32))
+    solver.state.grid.damping.assign(np.append(damping, [[0.0] * 4], axis=0).astype(np.float32))
 
 
 def set_time_step(state):
@@ -131,10 +140,10 @@ def test_scatter_conserves_mass_momentum_and_volume(shape, affine, device):
     assert_sums_agree(sums[:, 0:3].sum(axis=0), momentum.sum(axis=0), carried)
     volume = (mass / values["density"]).sum()
     assert_sums_agree(sums[:, 7].sum(), volume, sums[:, 7])
-    assert not cell_content(solver).any()
+    assert len(solver.state.grid.content_sums) == 0
     damped = cloud(shape, device)
     scatter(damped)
-    held = cell_content(damped).reshape(-1, 2)
+    held = cell_sums(damped).reshape(-1, 2)
     assert_sums_agree(held[:, FILLING].sum(), volume, held[:, FILLING])
     work = (mass / values["density"] * values["pressure"]).sum()
     assert work > 0.0
@@ -249,9 +258,7 @@ def test_strain_of_affine_fields(shape, device):
     solver = cloud(shape, device)
     place = node_positions(solver)
     velocity = affine_field(place)
-    set_nodes(solver, velocity, 2.0 * velocity, alpha=place[:, 0] / CELL)
-    reprojected = np.concatenate([3.0 * velocity, np.full((len(velocity), 1), 7.0)], axis=1)
-    solver.state.grid.reprojected.assign(reprojected.astype(np.float32))
+    set_end(solver, velocity, 2.0 * velocity, place[:, 0] / CELL, 3.0 * velocity, heat=7.0)
     values = particle_values(solver.state)
     here = affine_field(values["position"])
     trace = np.trace(AFFINE_GRADIENT)

@@ -14,15 +14,21 @@ division or a root counts as one, too. With a stencil of w nodes an axis and val
     weights           12 w                        3 axes, w weights and w slopes of two operations each
 
 What comes on top, such as the equation of state, is counted by hand from the kernels, to some ten per cent.
+
+Sharpening is done where nodes are solved. It computes a node's value anew for each neighbour, and is counted so.
+Folding concerns the nodes at walls alone: its count is that of one of them times their share of the domain's nodes,
+which is their share of the nodes that particles reach where matter fills the domain, as in the cube that is timed.
 """
 
 from dataclasses import dataclass
 
+import numpy as np
 import warp as wp
 
 from warp_mpm.config import Order
 from warp_mpm.kernels.precision import scalar
 from warp_mpm.model import Model
+from warp_mpm.scene import Wall
 
 NUMBER = wp.types.type_size_in_bytes(scalar)  # [bytes]
 PLACE = 3 * 2 + 3 * NUMBER  # cell and fraction of a particle [bytes]
@@ -35,7 +41,11 @@ STRAINING = 80  # work, divergence, strain rate along the acceleration, damping 
 MATERIAL = 140  # energy, density and its relaxation, motion, burn, pressure, viscosity, what limits the time step
 MOVING = 30  # a particle's new place alone
 SOLVING = 30  # sums of a node to its values
-SHARPENING = 6 * (2 * NODE + 1) + NODE  # six neighbours: difference and multiply-add of all lanes, and a minimum
+VECTOR = NODE // 2  # lanes that sharpening takes at a time
+# Seven values, six differences added with a weight, the sum of three axes, and its share added to a node's value.
+SHARPENING_ACCELERATIONS = 7 * (1 + VECTOR) + 6 * (1 + 2 * VECTOR) + 3 * VECTOR
+SHARPENING_VELOCITIES = 7 * 2 * VECTOR + 6 * (2 + 4 * VECTOR) + 6 * VECTOR
+FOLDING = 40  # a ghost added to its image, held components, and what the wall did to them
 
 
 @dataclass(frozen=True)
@@ -83,36 +93,76 @@ def weights(width: int) -> int:
 
 def phase_counts(model: Model) -> dict[str, Count]:
     """The count of every phase of a step, by the names of `Solver.phases`; those of single launches are nothing."""
-    damped, usf = model.damped, model.config.order is Order.USF
-    kick = NODE if model.sharpened else 0
-    cells = CONTENT if damped else 0
     counts = {
         "time step": Count(),
         "collect reactions": Count(),
         "end of step": Count(),
-        "clear": Count(node_bytes=NUMBER * (NODE + FIELD + CONTENT + REPROJECTED + kick)),
         "strain and material": _strain_and_material(model),
-        "grid to particles and back": _advance(model),
     }
-    if usf:
-        counts["grid to particles"] = counts.pop("grid to particles and back")
+    if model.config.order is not Order.MUSL:  # whose re-projection does that besides
+        counts["clear"] = Count(node_bytes=NUMBER * (NODE + FIELD))
+    if model.config.order is Order.USF:
+        counts["grid to particles"] = _advance(model)
         counts["momentum to grid"] = _scatter(model, momentum=True, force=False)
-        counts["forces to grid"] = _scatter(model, momentum=False, force=True)
+        counts["fold momentum"] = _fold(model, NODE)
         counts["solve momentum"] = Count(node_bytes=2 * NUMBER * NODE, node_operations=SOLVING // 2)
+        counts["forces to grid"] = _scatter(model, momentum=False, force=True)
+        counts["fold forces"] = _fold(model, NODE + FIELD)
         counts["solve forces"] = Count(node_bytes=2 * NUMBER * (NODE + FIELD), node_operations=SOLVING // 2)
         operations = weights(model.shape.width) + gather(model.shape.width, NODE) + MOVING
         counts["motion"] = Count(2 * PLACE + NUMBER, operations, node_bytes=NUMBER * NODE)
         return counts
+    counts["grid to particles and back"] = _advance(model)
     counts["particles to grid"] = _scatter(model, momentum=True, force=True)
-    counts["solve grid"] = Count(node_bytes=2 * NUMBER * (NODE + FIELD + cells), node_operations=SOLVING)
+    counts["fold grid"] = _fold(model, NODE + FIELD)
+    counts["solve grid"] = _solve(model)
     if model.config.order is Order.MUSL:
-        # Velocity, mass and acceleration in, both velocities of the step out; the re-projected sums both ways.
-        lanes = 2 * NODE + 2 * REPROJECTED + kick
-        counts["solve re-projection"] = Count(node_bytes=NUMBER * lanes, node_operations=SOLVING)
-    if model.sharpened:
-        sharpening = Count(node_bytes=2 * NUMBER * NODE, node_operations=SHARPENING)
-        counts |= {"sharpen accelerations": sharpening, "sharpen velocities": sharpening}
+        counts["fold re-projection"] = _fold(model, REPROJECTED, read_besides=2)  # mass and sound speed
+        counts["solve re-projection"] = _solve_reprojected(model)
     return counts
+
+
+def _solve(model: Model) -> Count:
+    """Sums to the start of a step and the field, those of cells to what they hold; the latter sums are emptied."""
+    lanes = 2 * (NODE + FIELD)
+    operations = SOLVING
+    if model.damped:
+        lanes += 3 * CONTENT
+    if model.config.order is Order.MUSL:
+        lanes += REPROJECTED  # emptied
+    if model.sharpened:
+        operations += SHARPENING_ACCELERATIONS
+    return Count(node_bytes=NUMBER * lanes, node_operations=operations)
+
+
+def _solve_reprojected(model: Model) -> Count:
+    """The step's start and the re-projected sums to its velocities and damping; the sums of the scatter are emptied."""
+    lanes = 2 * (NODE + REPROJECTED) + NODE + 2 * FIELD
+    operations = SOLVING + (SHARPENING_VELOCITIES if model.sharpened else 0)
+    return Count(node_bytes=NUMBER * lanes, node_operations=operations)
+
+
+def _fold(model: Model, lanes: int, read_besides: int = 0) -> Count:
+    """Ghosts behind walls read, the nodes that meet walls read and written; nothing of all others."""
+    owners, ghosts = wall_shares(model)
+    read = (owners + ghosts) * (lanes + read_besides)
+    return Count(node_bytes=NUMBER * (read + owners * lanes), node_operations=owners * FOLDING)
+
+
+def wall_shares(model: Model) -> tuple[float, float]:
+    """Shares, of a domain's nodes with their ghosts, of those on walls or next to them, and of the ghosts behind."""
+    apart = in_front = 1.0
+    for axis, cells in enumerate(model.scene.domain.cells):
+        node = np.arange(-1, cells + 2)
+        low, high = (wall is not Wall.OPEN for wall in model.scene.walls.faces()[2 * axis : 2 * axis + 2])
+        near, behind = np.zeros((2, len(node)), dtype=bool)
+        if low:
+            near, behind = near | (node <= 1), behind | (node < 0)
+        if high:
+            near, behind = near | (node >= cells - 1), behind | (node > cells)
+        apart *= 1.0 - near.mean()
+        in_front *= 1.0 - behind.mean()
+    return float(in_front - apart), float(1.0 - in_front)
 
 
 def _advance(model: Model) -> Count:
