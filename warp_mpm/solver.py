@@ -13,8 +13,8 @@ import numpy as np
 import warp as wp
 
 from warp_mpm.config import Order
-from warp_mpm.kernels import grid as grid_kernels
 from warp_mpm.kernels import fold, material, motion, reduce, reproject, transfer
+from warp_mpm.kernels import grid as grid_kernels
 from warp_mpm.kernels.blocks import NODES
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
 from warp_mpm.kernels.node_pass import Phase
