@@ -16,6 +16,7 @@ from warp_mpm.kernels.walls import (
     Boundary,
     free_components,
     ghost_sides,
+    holds_any,
     image_count,
     image_node,
     image_sides,
@@ -32,6 +33,7 @@ def tally_walls(
     boundary: Boundary,
     index: wp.vec3i,
     owned: wp.vec3i,
+    free: vector3,
     force: bool,
     total_mass: scalar,
     share: scalar,
@@ -43,19 +45,21 @@ def tally_walls(
 
     `total_mass` is that of the node and its ghosts, whose whole weight counts at the node.
     """
+    held = holds_any(free)
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
-                sides = image_sides(owned, i, j, k)
-                x = grid.sums[image_node(grid, index, sides)]
-                scattered = first_three(x)
-                body = vector3()
-                if force:
-                    scattered = second_three(x)
-                    if i + j + k == 0:
-                        body = total_mass * boundary.gravity
-                returned = share * x[3] * value
-                tally_reaction(boundary, grid, index, sides, share * scattered, body, returned, reactions, slot)
+                if held or i + j + k > 0:
+                    sides = image_sides(owned, i, j, k)
+                    x = grid.sums[image_node(grid, index, sides)]
+                    scattered = share * first_three(x)
+                    body = vector3()
+                    if force:
+                        scattered = second_three(x)
+                        if i + j + k == 0:
+                            body = total_mass * boundary.gravity
+                    returned = share * x[3] * value
+                    tally_reaction(boundary, grid, index, sides, free, scattered, body, returned, reactions, slot)
 
 
 @functools.cache
@@ -102,10 +106,12 @@ def fold_kernel(momentum: bool, force: bool) -> wp.Kernel:
             acceleration = vector3()
             if inverse > ZERO:
                 acceleration = inverse * force_left + wp.cw_mul(free, boundary.gravity)
-            tally_walls(grid, boundary, index, owned, True, mass, ONE, acceleration, phase.reactions, slot)
+            tally_walls(grid, boundary, index, owned, free, True, mass, ONE, acceleration, phase.reactions, slot)
         if wp.static(momentum) and phase.pic_share > ZERO:
             velocity = inverse * momentum_left
-            tally_walls(grid, boundary, index, owned, False, mass, phase.pic_share, velocity, phase.impulses, slot)
+            tally_walls(
+                grid, boundary, index, owned, free, False, mass, phase.pic_share, velocity, phase.impulses, slot
+            )
         grid.sums[n] = vector8(
             momentum_left[0],
             momentum_left[1],
@@ -139,17 +145,22 @@ def fold_reprojected_kernel() -> wp.Kernel:
                     s = image_signs(boundary, sides)
                     x = grid.reprojected[image_node(grid, index, sides)]
                     total += vector4(s[0] * x[0], s[1] * x[1], s[2] * x[2], x[3])
-        momentum = wp.cw_mul(free_components(boundary, grid.cells, index), first_three(total))
+        free = free_components(boundary, grid.cells, index)
+        held = holds_any(free)
+        momentum = wp.cw_mul(free, first_three(total))
         velocity = inverse_mass(grid, grid.sums[n][3]) * momentum
         alpha = damped_share(now, grid.field[n][1])
         for i in range(image_count(owned[0])):
             for j in range(image_count(owned[1])):
                 for k in range(image_count(owned[2])):
-                    sides = image_sides(owned, i, j, k)
-                    m = image_node(grid, index, sides)
-                    given = alpha * first_three(grid.reprojected[m])
-                    returned = alpha * grid.sums[m][3] * velocity
-                    tally_reaction(boundary, grid, index, sides, given, vector3(), returned, phase.impulses, slot)
+                    if held or i + j + k > 0:
+                        sides = image_sides(owned, i, j, k)
+                        m = image_node(grid, index, sides)
+                        given = alpha * first_three(grid.reprojected[m])
+                        returned = alpha * grid.sums[m][3] * velocity
+                        tally_reaction(
+                            boundary, grid, index, sides, free, given, vector3(), returned, phase.impulses, slot
+                        )
         grid.reprojected[n] = vector4(momentum[0], momentum[1], momentum[2], total[3])
 
     return node_kernel(fold, None, 1)

@@ -107,9 +107,10 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
             grid.field[n] = field_at(grid, phase, slot, index, sums, inverse)
         if wp.static(force and sharpened) and inverse > ZERO:
             pulled = phase.strength * second_three(excess(grid, boundary, index, ZERO))
-            added = inverse * wp.cw_mul(free_components(boundary, grid.cells, index), pulled)
+            free = free_components(boundary, grid.cells, index)
+            added = inverse * wp.cw_mul(free, pulled)
             if meets_wall(boundary, grid.cells, index):
-                tally_sharpening(grid, boundary, phase, slot, index, owned, pulled, added)
+                tally_sharpening(grid, boundary, phase, slot, index, owned, free, pulled, added)
             a += added
         for i in range(image_count(owned[0])):
             for j in range(image_count(owned[1])):

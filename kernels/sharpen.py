@@ -30,6 +30,7 @@ from warp_mpm.kernels.walls import (
     WALL_OPEN,
     Boundary,
     free_components,
+    holds_any,
     image_count,
     image_node,
     image_sides,
@@ -123,14 +124,19 @@ def tally_sharpening(
     slot: int,
     index: wp.vec3i,
     owned: wp.vec3i,
+    free: vector3,
     force: vector3,
     added: vector3,
 ):
     """Tally what walls do to the change of a node's acceleration, `added` by a `force`, in `reactions` [N]."""
+    held = holds_any(free)
     for i in range(image_count(owned[0])):
         for j in range(image_count(owned[1])):
             for k in range(image_count(owned[2])):
-                sides = image_sides(owned, i, j, k)
-                given = wp.where(i + j + k == 0, force, vector3())
-                returned = grid.sums[image_node(grid, index, sides)][3] * added
-                tally_reaction(boundary, grid, index, sides, given, vector3(), returned, phase.reactions, slot)
+                if held or i + j + k > 0:
+                    sides = image_sides(owned, i, j, k)
+                    given = wp.where(i + j + k == 0, force, vector3())
+                    returned = grid.sums[image_node(grid, index, sides)][3] * added
+                    tally_reaction(
+                        boundary, grid, index, sides, free, given, vector3(), returned, phase.reactions, slot
+                    )

@@ -93,6 +93,12 @@ def free_components(boundary: Boundary, cells: wp.vec3i, node: wp.vec3i) -> vect
 
 
 @wp.func
+def holds_any(free: vector3) -> bool:
+    """Whether a wall holds any component at a node, by its free ones."""
+    return free[0] * free[1] * free[2] == ZERO
+
+
+@wp.func
 def meets_wall(boundary: Boundary, cells: wp.vec3i, node: wp.vec3i) -> bool:
     """Whether a node lies on a wall or owns a ghost behind one."""
     meets = False
@@ -182,19 +188,19 @@ def tally_reaction(
     grid: Grid,
     node: wp.vec3i,
     sides: wp.vec3i,
+    free: vector3,
     scattered: vector3,
     body: vector3,
     value: vector3,
     reactions: wp.array(dtype=wp.float64),
     slot: int,
 ):
-    """Tally what walls add to the momentum that an image gives back to the particles.
+    """Tally what walls add to the momentum that an image gives back to the particles; `free` are the node's components.
 
     The image received `scattered` (a force f, or a momentum), `body` acts on it besides (M g), and it gives back
     `value`, its mass times the owner's nodal value. Summed over a node's images the difference is -2 (value +
     scattered) where a wall reverses a component, and -(scattered + body) where it holds one.
     """
-    free = free_components(boundary, grid.cells, node)
     signs = image_signs(boundary, sides)
     for component in range(3):
         reaction = ZERO
