@@ -23,7 +23,7 @@ from warp_mpm.launch import Launcher, Task
 from warp_mpm.model import LARGEST_DRIFT, STRAINS, ChargeModel, Model
 from warp_mpm.state import State
 
-THIN = 1.5  # nodes of active blocks to a particle; in a dense gas it is 0.2
+THIN = 0.5  # nodes of active blocks to a particle from which on asking ahead pays; in a dense gas there are 0.2
 STEPS_BETWEEN_SORTS = 20  # neighbours in memory stay neighbours on the grid for about as long
 
 

@@ -26,7 +26,7 @@ from warp_mpm.launch import Launcher
 from warp_mpm.model import Model
 from warp_mpm.places import recorded_places
 
-GRID_SLOTS = 8  # pieces into which the work on nodes is cut on a CPU
+GRID_SLOTS = 16  # pieces into which the work on nodes is cut on a CPU: more, and late gas is shared more evenly
 CACHE_LINE = 64  # [bytes]; a node's eight lanes never lie in two
 NO_STEP = -2  # a stamp that no step has
 LIGHT = 1e-14  # of a particle's mass: nodes with less count as empty
