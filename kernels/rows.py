@@ -55,7 +55,7 @@ class Vectors:
     """In vectors of the compiler's, of up to `widest` numbers, which a CPU takes at a time.
 
     The last chunk may reach one node farther than the row. What is there has no weight, and is written back as it was:
-    still short of what another thread may write to (see `LARGEST_DRIFT`), and arrays have a node to spare.
+    still short of what another thread may write to (see `warp_mpm/model.py`), and arrays have a node to spare.
     """
 
     def __init__(self, lanes: int, width: int, widest: int) -> None:

@@ -16,10 +16,14 @@ from warp_mpm.materials import Material
 from warp_mpm.scene import Charge, Scene, Wall
 
 DEFAULT_BURN_WIDTH = 0.5  # [cells]; narrower gains nothing, the front is then as wide as the grid makes it
-LARGEST_DRIFT = 3.0  # cells that a particle may move between two sortings
 # Two slabs of one parity have a whole one between them: particles drift towards each other from both, and their
 # stencils reach two nodes up and one down, and one more where rows are written four at a time (`kernels/stencil.py`).
-THINNEST_SLAB = 10  # cells
+# So with 1.6 cells of a half slab set aside, no node is written to from both (tests/test_slabs.py counts).
+SET_ASIDE = 1.6  # cells
+LARGEST_DRIFT = 3.0  # cells that a particle may move between two sortings; more is never needed
+SLAB = 10  # cells: thick enough for that
+THINNEST_SLAB = 6  # cells: of small domains, whose particles are sorted more often
+FEWEST_SLABS = 4  # two and two: with fewer there is nothing to share
 
 WALL_CODES = {Wall.OPEN: walls.WALL_OPEN, Wall.SLIP: walls.WALL_SLIP, Wall.STICK: walls.WALL_STICK}
 SHAPES = {
@@ -126,6 +130,11 @@ class Model:
         return int(self.slabs.count)
 
     @property
+    def largest_drift(self) -> float:
+        """Cells that a particle may move between two sortings."""
+        return largest_drift(int(self.slabs.cells), self.slab_count)
+
+    @property
     def burns(self) -> bool:
         """Whether any charge is an explosive."""
         return any(charge.material.burn is not None for charge in self.charges)
@@ -138,8 +147,7 @@ def build_model(scene: Scene, config: SolverConfig, device: wp.Device) -> Model:
     slabs = Slabs()
     slabs.axis = int(np.argmax(cells))
     longest = int(cells[slabs.axis])
-    # An even number, so that as many slabs run first as second.
-    slabs.count = 1 if device.is_cuda else max(1, longest // THINNEST_SLAB // 2 * 2)
+    slabs.count = 1 if device.is_cuda else slab_count(longest)
     slabs.cells = longest
     slabs.charges = len(scene.charges)
     return Model(
@@ -154,6 +162,19 @@ def build_model(scene: Scene, config: SolverConfig, device: wp.Device) -> Model:
         viscosity=_viscosity(scene, config),
         slabs=slabs,
     )
+
+
+def slab_count(cells: int) -> int:
+    """Number of slabs for so many cells along an axis: even, so that as many run first as second; or one."""
+    if cells < FEWEST_SLABS * THINNEST_SLAB:
+        return 1
+    return max(FEWEST_SLABS, cells // SLAB // 2 * 2)
+
+
+def largest_drift(cells: int, slabs: int) -> float:
+    """Cells that a particle may move between two sortings into slabs of so many cells in all."""
+    thinnest = cells // slabs
+    return min(LARGEST_DRIFT, thinnest // 2 - SET_ASIDE) if slabs > 1 else LARGEST_DRIFT
 
 
 def _charge_model(scene: Scene, charge: Charge, burn_width: float) -> ChargeModel:

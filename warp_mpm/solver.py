@@ -1,8 +1,9 @@
 """One step of the Material Point Method, as named phases.
 
-MUSL (the default): choose the time step | sharpen the accelerations | grid to particles, and their momentum back to
-the grid | sharpen the velocities | strain, material and motion | particles to grid | solve the grid. The particles are
-scattered at the end of a step, so that the field pressure on the grid belongs to the same instant as the particles.
+MUSL (the default): choose the time step | grid to particles, and their momentum back to the grid | solve what was
+re-projected | strain, material and motion | particles to grid | solve the grid. What lies behind walls is folded back
+before each solution, and both sharpen. The particles are scattered at the end of a step, so that the field pressure on
+the grid belongs to the same instant as the particles.
 """
 
 import itertools
@@ -20,7 +21,7 @@ from warp_mpm.kernels.initial_strain import initial_strain_kernel
 from warp_mpm.kernels.node_pass import Phase
 from warp_mpm.kernels.precision import vector3
 from warp_mpm.launch import Launcher, Task
-from warp_mpm.model import LARGEST_DRIFT, STRAINS, ChargeModel, Model
+from warp_mpm.model import STRAINS, ChargeModel, Model
 from warp_mpm.state import State
 
 THIN = 0.5  # nodes of active blocks to a particle from which on asking ahead pays; in a dense gas there are 0.2
@@ -94,7 +95,7 @@ class Solver:
         """Sort the particles before any of them can drift out of its slab's reach, and for locality."""
         clock = self.state.clock_values()
         # Twice the last step's way: the next one is at most a little longer.
-        drifting = clock["drift"] + 2.0 * clock["last_drift"] > LARGEST_DRIFT
+        drifting = clock["drift"] + 2.0 * clock["last_drift"] > self.model.largest_drift
         if drifting or self.steps_since_sort >= STEPS_BETWEEN_SORTS:
             self.sort()
 
