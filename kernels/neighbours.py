@@ -15,9 +15,11 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.precision import REAL, scalar, vector4, vector8
+from warp_mpm.kernels.wide_access import wide_access
 
 _VECTORS = f"""
     typedef {REAL} half __attribute__((ext_vector_type(4)));
+    auto load = [](const void* from) {{ half x; memcpy(&x, from, sizeof(x)); return x; }};
     auto plus = [](half sum, half x, {REAL} weight) {{ return __builtin_elementwise_fma(x, (half)weight, sum); }};
     auto minus = [](half x, half y) {{ return x - y; }};
     auto add = [](half x, half y) {{ return x + y; }};
@@ -34,6 +36,8 @@ _VECTORS = f"""
 
 _PLAIN = f"""
     typedef wp::vec_t<4, {REAL}> half;
+{wide_access(4)}
+    auto load = [&](const void* from) {{ return read(from); }};
     auto plus = [](half sum, half x, {REAL} weight) {{ return wp::add(sum, wp::mul(x, weight)); }};
     auto minus = [](half x, half y) {{ return wp::sub(x, y); }};
     auto add = [](half x, half y) {{ return wp::add(x, y); }};
@@ -47,8 +51,8 @@ _PLAIN = f"""
 
 _SHARED = f"""
     typedef {REAL} number;
-    auto low = [](const void* node) {{ half x; memcpy(&x, node, sizeof(x)); return x; }};
-    auto high = [](const void* node) {{ half x; memcpy(&x, ({REAL}*)node + 4, sizeof(x)); return x; }};
+    auto low = [&](const void* node) {{ return load(node); }};
+    auto high = [&](const void* node) {{ return load((number*)node + 4); }};
     const int at[7] = {{n - stride_x, n + stride_x, n - stride_y, n + stride_y, n - 1, n + 1, n}};
 """
 

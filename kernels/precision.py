@@ -17,6 +17,7 @@ if PRECISION not in SCALARS:
     raise ValueError(f"{VARIABLE}: expected {' or '.join(SCALARS)}, got {PRECISION!r}")
 
 scalar, REAL, DIGITS = SCALARS[PRECISION]  # the type, its name in C++, its binary digits
+BYTES = wp.types.type_size_in_bytes(scalar)
 
 vector2 = wp.types.vector(2, scalar)
 vector3 = wp.types.vector(3, scalar)

@@ -6,6 +6,7 @@ plus a weighted chunk; `as_lanes`, a node's value from one of Warp's.
 """
 
 from warp_mpm.kernels.precision import REAL
+from warp_mpm.kernels.wide_access import wide_access
 
 
 def warp_type(lanes: int) -> str:
@@ -15,6 +16,8 @@ def warp_type(lanes: int) -> str:
 
 class Nodes:
     """Node by node, in vectors of Warp's; additions are atomic. This is what a GPU runs."""
+
+    unrolled = "#pragma unroll"  # else the weights lie in memory
 
     def __init__(self, lanes: int, width: int) -> None:
         self.lanes, self.width = lanes, width
@@ -30,11 +33,12 @@ class Nodes:
     auto mul = [](lanes x, {REAL} weight) {{ return wp::mul(x, weight); }};
     auto plus = [](lanes sum, lanes x, {REAL} weight) {{ return wp::add(sum, wp::mul(x, weight)); }};
     auto as_lanes = [](lanes x) {{ return x; }};
+{wide_access(self.lanes)}
 """ + self.each("""
     typedef lanes T@;
-    auto load@ = [](const lanes* row) { return row[@]; };
+    auto load@ = [&](const lanes* row) { return read(row + @); };
     auto begin@ = [](const lanes*) { return lanes{}; };
-    auto end@ = [](lanes* row, lanes x) { wp::atomic_add(row + @, x); };
+    auto end@ = [&](lanes* row, lanes x) { add_to(row + @, x); };
     auto repeat@ = [](lanes x) { return x; };
 """)
 
@@ -57,6 +61,8 @@ class Vectors:
     The last chunk may reach one node farther than the row. What is there has no weight, and is written back as it was:
     still short of what another thread may write to (see `warp_mpm/model.py`), and arrays have a node to spare.
     """
+
+    unrolled = ""  # as the compiler likes
 
     def __init__(self, lanes: int, width: int, widest: int) -> None:
         self.lanes, self.width, self.numbers = lanes, width, lanes * width

@@ -50,6 +50,7 @@ def _compiled(body: Callable[[Row], str], lanes: int, width: int, widest: int, p
 def _gather(row: Row) -> str:
     return f"""{row.declarations()}
 {row.each("    T@ total@ = {};")}
+{row.unrolled}
     for (int i = 0; i < {row.width}; ++i) {{
 {row.each("        T@ plane@ = {};")}
         for (int j = 0; j < {row.width}; ++j) {{
@@ -69,6 +70,7 @@ def _gather(row: Row) -> str:
 def _gather_gradient(row: Row) -> str:
     return f"""{row.declarations()}
 {row.each("    T@ total@ = {}, by_x@ = {}, by_y@ = {};")}
+{row.unrolled}
     for (int i = 0; i < {row.width}; ++i) {{
 {row.each("        T@ plane@ = {}, plane_y@ = {};")}
         for (int j = 0; j < {row.width}; ++j) {{
@@ -100,6 +102,7 @@ def _scatter(row: Row) -> str:
     lanes given = as_lanes(value);
 {row.weights("wz", "stencil.wz")}
 {row.each("    T@ along@ = mul(repeat@(given), wz@);")}
+{row.unrolled}
     for (int i = 0; i < {row.width}; ++i)
         for (int j = 0; j < {row.width}; ++j) {{
             {AT}
@@ -118,6 +121,7 @@ def _scatter_gradient(row: Row) -> str:
 {row.each("    T@ along@ = plus(mul(repeat@(given), wz@), repeat@(given_z), sz@);")}
 {row.each("    T@ along_x@ = mul(repeat@(given_x), wz@);")}
 {row.each("    T@ along_y@ = mul(repeat@(given_y), wz@);")}
+{row.unrolled}
     for (int i = 0; i < {row.width}; ++i) {{
 {row.each("        T@ plane@ = plus(mul(along@, stencil.wx[i]), along_x@, stencil.sx[i]);")}
 {row.each("        T@ plane_y@ = mul(along_y@, stencil.wx[i]);")}
