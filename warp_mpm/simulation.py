@@ -32,7 +32,7 @@ from warp_mpm.section import section_pressure
 from warp_mpm.solver import Solver
 from warp_mpm.state import State
 from warp_mpm.stopping import StopRequest
-from warp_mpm.summary import figures_of_merit
+from warp_mpm.summary import figures_of_merit, gauge_warnings
 from warp_mpm.version import VERSION
 
 GROWTH = 1.1  # of the time step, at most; as in kernels.reduce
@@ -350,6 +350,7 @@ class _Run:
     def _summary(self, record: StepRecord) -> dict[str, Any]:
         clock = self.state.clock_values()
         final = self.history[-1]
+        warnings = [*self.scene.warnings, *self.warnings, *self._frame_warnings(), *clamp_warnings(self.audit)]
         return {
             **self._given(),
             "steps": self.steps,
@@ -371,7 +372,7 @@ class _Run:
             "pressure_spread": final["pressure_spread"],
             "sparse_share": final["sparse_share"],
             "particle_volume_error": self._volume_error(),
-            "warnings": [*self.scene.warnings, *self.warnings, *self._frame_warnings(), *clamp_warnings(self.audit)],
+            "warnings": [*warnings, *gauge_warnings(self.scene, record)],
         }
 
     def _volume_error(self) -> float | None:
