@@ -8,10 +8,10 @@ import meshio
 import numpy as np
 
 from warp_mpm.builder import SceneBuilder
-from warp_mpm.checks import not_negative
+from warp_mpm.checks import mistake, not_negative
 from warp_mpm.detonators import PointDetonator
 from warp_mpm.geometry import Mesh
-from warp_mpm.materials import ammonium_nitrate
+from warp_mpm.material_library import find_material
 from warp_mpm.mesh_files import load_mesh
 from warp_mpm.scene import Scene, Wall, Walls
 
@@ -24,23 +24,27 @@ def scene(
     *,
     mesh: str = "",
     unit: str = "mm",
+    material: str = "ammonium_nitrate",
     cell_size: float = 4e-3,
     room: float = 0.02,
     particles_per_axis: int = 2,
     end_time: float = 75e-6,
 ) -> Scene:
-    """The paper's explosive in the shape of a closed surface, free in a vacuum, lit where its x is least.
+    """An explosive in the shape of a closed surface, free in a vacuum, lit where its x is least.
 
     Args:
         mesh: an STL, OBJ, PLY or Gmsh file; without one the ring that `write_ring` makes.
         unit: of its coordinates.
+        material: an explosive of the library, by its name; without one the paper's.
         cell_size: wanted [m].
         room: around it [m].
         particles_per_axis: particles along each axis of every cell.
         end_time: [s].
     """
     solid = load_mesh(mesh, unit=unit) if mesh else _ring(unit)
-    explosive = ammonium_nitrate()
+    explosive = find_material(material)
+    if explosive.burn is None:
+        raise mistake("material", "an explosive", repr(material), "'warp-mpm materials' lists them")
     lower, upper = solid.bounds()
     first, last = (solid.vertices[index(solid.vertices[:, 0])] for index in (np.argmin, np.argmax))
 

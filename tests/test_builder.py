@@ -375,3 +375,10 @@ def test_material_warnings_reach_the_scene():
 def test_names_that_do_not_suit_files_are_refused(name):
     with pytest.raises(InputError, match="scene: name: expected letters, digits"):
         SceneBuilder(name)
+
+
+def test_walls_are_walls():
+    with pytest.raises(InputError, match=r"^walls: x_low: expected a Wall, got 'open'; Wall\.SLIP, Wall\.STICK or "):
+        Walls.all("open")
+    with pytest.raises(InputError, match=r"^walls: z_high: expected a Wall, got None"):
+        Walls(z_high=None)

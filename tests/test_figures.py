@@ -36,6 +36,7 @@ from warp_mpm.output.frame import SectionPicture
 from warp_mpm.output.tables import write_summary
 from warp_mpm.progress import Silent
 from warp_mpm.run_directory import Run, load
+from warp_mpm.scene import Gauge
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import simulate
 
@@ -343,6 +344,21 @@ def test_gauges_are_shown_with_their_impulse(scene, tmp_path):
     np.testing.assert_allclose(pressure.lines[0].get_data(), [[0.0, 1.0, 3.0], [0.0, 2.0, 1.0]])
     np.testing.assert_allclose(impulse.lines[0].get_ydata(), [0.0, 1.0, 4.0])  # kPa s
     np.testing.assert_allclose(speed.lines[0].get_ydata(), [0.0, 5.0, 10.0])
+
+
+@pytest.mark.parametrize(("count", "named"), [(10, 10), (40, 21)])
+def test_names_of_gauges_close_together_are_apart(tmp_path, count, named):
+    """From the middle to the edge: the last one's name would lie on what is written beside the drawing."""
+    gauges = [Gauge(f"gauge_with_a_name_{n}", (0.03 + 0.03 * n / (count - 1), 0.04, 0.01)) for n in range(count)]
+    run = left_by(tmp_path, scene := replace(block((6, 8, 2)), gauges=tuple(gauges)), frames=[first_frame(scene)])
+    (axes,) = charge_figure(run).axes
+    texts = [text for text in axes.texts if text.get_text()]
+    names = [text for text in texts if text.get_text().startswith("gauge")]
+    crosses = [line.get_window_extent() for line in axes.lines if line.get_marker() == "x"]
+    assert (len(crosses), len(names)) == (count, named)
+    for name in names:
+        others = [text.get_window_extent() for text in texts if text is not name]
+        assert name.get_window_extent().count_overlaps([*others, *crosses]) == 0
 
 
 def test_an_unknown_picture_is_one_line(plate, tmp_path):

@@ -9,6 +9,7 @@ from warp_mpm.config import Save
 from warp_mpm.detonators import PointDetonator
 from warp_mpm.errors import InputError
 from warp_mpm.exact.kenamond import inert_sphere
+from warp_mpm.material_library import find_material
 from warp_mpm.output.figures.particles import particles_figure
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.scenes.from_mesh import write_ring
@@ -42,6 +43,16 @@ def test_from_mesh_takes_any_mesh(tmp_path):
     assert scene.mass == pytest.approx(1000.0 * load_scene("from_mesh", cell_size=8e-3).mass)
     with pytest.raises(InputError, match=r"scene from_mesh: mesh 'none.stl': expected a file that can be read, got no"):
         load_scene("from_mesh", mesh="none.stl")
+
+
+def test_from_mesh_takes_any_explosive_of_the_library():
+    scene, tnt = (load_scene("from_mesh", cell_size=8e-3, **choice) for choice in ({}, {"material": "tnt"}))
+    assert tnt.charges[0].material == find_material("tnt")
+    assert tnt.mass == pytest.approx(1.63 * scene.mass)
+    with pytest.raises(InputError, match=r"scene from_mesh: material: expected one of tnt, .*'tn'; did you mean tnt\?"):
+        load_scene("from_mesh", material="tn")
+    with pytest.raises(InputError, match=r"scene from_mesh: material: expected an explosive, got 'water'"):
+        load_scene("from_mesh", material="water")
 
 
 def stl(path, *bodies):

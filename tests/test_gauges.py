@@ -157,6 +157,18 @@ def test_outside_of_matter_there_is_nothing(device):
     assert np.all(moving.position[left] == moving.position[-1])
 
 
+def test_gauges_that_nothing_came_to_are_named_at_the_end():
+    """Gas reaches the one two cells away, once the front has come through; the far one is 16 cells away."""
+    ends = Walls(x_high=Wall.OPEN)
+    scene = block((4, 1, 1), detonators=[FACE], walls=ends, margin_cells=(0, 20, 0, 0, 0, 0), end_time=3e-5)
+    gauges = [Gauge("inside", middle(0.02)), Gauge("near", middle(0.06)), Gauge("far", middle(0.2))]
+    moving = Gauge("carried", middle(0.02), moving=True)
+    summary = simulate(with_gauges(scene, *gauges, moving), save=NUMBERS_ONLY, device="cpu").summary
+    assert summary["gauges"]["near"]["peak_pressure_pa"] > 0.0
+    (warning,) = (warning for warning in summary["warnings"] if warning.startswith("gauges:"))
+    assert warning.startswith(f"gauges: nothing came to 'far' before {summary['end_time_s'] * 1e6:g} us")
+
+
 def trapezoid(values, time):
     """Integral over the time of values that are linear from step to step."""
     return sum((time[n] - time[n - 1]) * (float(values[n]) + float(values[n - 1])) / 2 for n in range(1, len(time)))

@@ -4,7 +4,9 @@ import io
 
 import pytest
 from rich.console import Console
+from scenes_for_tests import block
 
+import warp_mpm as mpm
 from warp_mpm.output import progress_bar
 from warp_mpm.output.progress_bar import progress_on
 
@@ -33,6 +35,19 @@ def test_a_bar_on_a_terminal():
     assert "compiling [all] kernels" in text
     assert "100%" in text
     assert "100.0 of 100.0 us  step 1000  2.61 GPa" in text
+
+
+def test_a_script_sees_what_the_command_shows(capsys):
+    """The run closes its progress, whatever way it ends: a bar would hide the cursor of the terminal for good."""
+    console = Console(file=io.StringIO(), width=100, force_terminal=True)
+    result = mpm.simulate(block((4, 3, 3), end_time=2e-6), device="cpu", progress=mpm.progress_on(console))
+    assert console.file.getvalue().endswith("\x1b[?25h")  # shows the cursor
+    mpm.simulate(block((4, 3, 3), end_time=2e-6), device="cpu", progress=mpm.progress_on())
+    mpm.print_summary(result.summary)
+    shown = capsys.readouterr().out
+    assert "block: 288 particles in 36 cells on CPU" in shown
+    assert "100%  2.0 of 2.0 us" in shown
+    assert "peak pressure" in shown
 
 
 @pytest.mark.parametrize("terminal", [True, False])

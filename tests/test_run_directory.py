@@ -43,6 +43,11 @@ def ended(tmp_path_factory) -> Result:
     return simulate(SCENE, save=Save(frames=4, fields=("density",), figures=False), output=directory)
 
 
+def test_a_result_is_printed_in_one_line(ended):
+    """Not all that it holds, as a notebook would."""
+    assert repr(ended) == f"Result(output={ended.output!r})"
+
+
 def frame(index: int, scene=SCENE) -> Frame:
     """Made-up values that tell frames and particles apart."""
     count = scene.particle_count

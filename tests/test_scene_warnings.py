@@ -1,10 +1,10 @@
-"""What is odd about a scene, but no mistake: detonators that light nothing, explosives too small for their cells."""
+"""What is odd about a scene, but no mistake: idle detonators, explosives too small for their cells or cut by others."""
 
 import subprocess
 import sys
 
 import pytest
-from scenes_for_tests import CELL, explosive
+from scenes_for_tests import CELL, OPEN, block, explosive, inert_gas
 
 from warp_mpm import materials
 from warp_mpm.builder import SceneBuilder
@@ -65,6 +65,55 @@ def test_speeds_that_differ_in_the_fourth_digit_are_the_same():
         made = materials.explosive("gas", density=1000.0, detonation_speed=stated, equation_of_state=gas, energy=energy)
         assert bool(made.warnings) == warned
         assert made.burn.detonation_speed == pytest.approx(2800.0, rel=1e-6)
+
+
+def side_by_side(*solids, materials) -> tuple[str, ...]:
+    """Warnings of a cube of 20 cells with charges "a", "b", ... of these solids, all lit in its middle."""
+    builder = SceneBuilder("cube")
+    builder.domain((0.0, 0.0, 0.0), (LENGTH, LENGTH, LENGTH), cell_size=CELL)
+    names = "abc"[: len(solids)]
+    for name, solid, material in zip(names, solids, materials, strict=True):
+        builder.charge(solid, material, name=name, may_stay_unlit=material.burn is not None)
+    lit = tuple(name for name, material in zip(names, materials, strict=True) if material.burn)
+    builder.detonator(PointDetonator((LENGTH / 2, LENGTH / 2, LENGTH / 2), charges=lit))
+    builder.end_time(1e-6)
+    return builder.build().warnings
+
+
+def slab(low, high):
+    """Part of that cube, between two shares of its length along x."""
+    return Box((low * LENGTH, 0.0, 0.0), (high * LENGTH, LENGTH, LENGTH))
+
+
+def test_an_explosive_that_earlier_charges_cut_is_told():
+    """The faces are those of cells, so that the shares of the sites are those of the volume."""
+    burning = explosive()
+    (warning,) = side_by_side(slab(0.0, 0.5), slab(0.4, 0.9), materials=[burning, burning])
+    assert warning.startswith("charge 'b': 20% of it is left out, because it lies in 'a', added before it; ")
+    assert "add it before them" in warning
+    solids = slab(0.0, 0.4), slab(0.8, 1.0), slab(0.2, 1.0)
+    (warning,) = side_by_side(*solids, materials=[burning, inert_gas(), burning])
+    assert warning.startswith("charge 'c': 50% of it is left out, because it lies in 'a', 'b', added before it; ")
+
+
+@pytest.mark.parametrize(
+    ("solids", "materials"),
+    [
+        ((slab(0.0, 0.5), slab(0.4, 0.9)), (explosive(), inert_gas())),  # what does not burn fills what is left
+        ((slab(0.0, 0.5), slab(0.5, 1.0)), (explosive(), explosive())),
+        ((slab(0.0, 0.1), slab(0.0, 1.0) - slab(0.0, 0.1)), (inert_gas(), explosive())),
+        ((Sphere((0.05, 0.05, 0.05), 0.03), slab(0.0, 1.0)), (explosive(), explosive())),  # 1.4 % of it
+    ],
+)
+def test_charges_that_lose_nothing_of_note_say_nothing(solids, materials):
+    assert side_by_side(*solids, materials=materials) == ()
+
+
+@pytest.mark.parametrize(("pressure", "asked"), [(0.0, False), (1.0, True), (999.0, True), (1000.0, False)])
+def test_an_ambient_pressure_in_bar_is_asked_for(pressure, asked):
+    warnings = block((6, 6, 6), walls=OPEN, ambient_pressure=pressure).warnings
+    expected = f"ambient pressure {pressure:g} Pa: is it in pascals? 1 bar is 1e5 Pa"
+    assert warnings == ((expected,) if asked else ())
 
 
 @pytest.mark.parametrize(

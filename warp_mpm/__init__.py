@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from warp_mpm.material_library import air, find_material, library, water
     from warp_mpm.materials import Burn, Material, OnMismatch, ammonium_nitrate, explosive, inert
     from warp_mpm.mesh_files import load_mesh
+    from warp_mpm.output.progress_bar import progress_on
+    from warp_mpm.output.tables import print_summary
     from warp_mpm.run_directory import Run, load
     from warp_mpm.scene import Scene, Wall, Walls
     from warp_mpm.scene_loading import list_scenes, load_scene
@@ -90,6 +92,8 @@ __all__ = [
     "load_materials",
     "load_mesh",
     "load_scene",
+    "print_summary",
+    "progress_on",
     "ring",
     "row",
     "simulate",
@@ -119,6 +123,8 @@ _HOMES = {
     "material_library": ("air", "find_material", "library", "water"),
     "mesh_files": ("load_mesh",),
     "materials": ("Burn", "Material", "OnMismatch", "ammonium_nitrate", "explosive", "inert"),
+    "output.progress_bar": ("progress_on",),
+    "output.tables": ("print_summary",),
     "run_directory": ("Run", "load"),
     "scene": ("Scene", "Wall", "Walls"),
     "scene_loading": ("list_scenes", "load_scene"),

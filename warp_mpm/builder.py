@@ -324,7 +324,10 @@ class SceneBuilder:
             collision_points=tuple(self._collision_points),
             picture_times=pictures,
             gauges=carried_gauges(self._here, self._gauges, domain, charges),
-            warnings=scene_warnings(charges, detonators, domain, end_time),
+            warnings=scene_warnings(
+                *(charges, [body.solid for body in self._bodies], detonators),
+                *(domain, end_time, self._ambient_pressure),
+            ),
         )
 
     def _given(self, name: str, value: Given | None) -> Given:

@@ -246,8 +246,6 @@ def _run(options: argparse.Namespace) -> None:
     """
     _choose_precision(options.precision)
 
-    from rich.console import Console
-
     from warp_mpm.output.progress_bar import progress_on
     from warp_mpm.output.tables import print_summary
     from warp_mpm.scene_loading import load_scene_from_text
@@ -258,20 +256,16 @@ def _run(options: argparse.Namespace) -> None:
     save = _save(options)
     start_quietly()
     scene = load_scene_from_text(options.scene, options.set)
-    progress = progress_on(Console())
-    try:
-        result = simulate(
-            scene,
-            config=config,
-            save=save,
-            output=options.output if options.output is not None else Path("out") / scene.name,
-            device=options.device,
-            threads=options.threads,
-            progress=progress,
-            resume=options.resume,
-        )
-    finally:
-        progress.close()
+    result = simulate(
+        scene,
+        config=config,
+        save=save,
+        output=options.output if options.output is not None else Path("out") / scene.name,
+        device=options.device,
+        threads=options.threads,
+        progress=progress_on(),
+        resume=options.resume,
+    )
     print_summary(result.summary)
     print(f"files in {result.output}")
 

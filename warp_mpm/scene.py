@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from warp_mpm.checks import instance
 from warp_mpm.detonators import Detonator
 from warp_mpm.geometry import Solid
 from warp_mpm.materials import Material
@@ -38,6 +39,15 @@ class Walls:
     y_high: Wall = Wall.SLIP
     z_low: Wall = Wall.SLIP
     z_high: Wall = Wall.SLIP
+
+    def __post_init__(self) -> None:
+        """Check the faces.
+
+        Raises:
+            InputError: one is not a `Wall`.
+        """
+        for name, wall in zip(FACE_NAMES, self.faces(), strict=True):
+            instance(f"walls: {name}", wall, Wall, "a Wall", "Wall.SLIP, Wall.STICK or Wall.OPEN")
 
     @classmethod
     def all(cls, wall: Wall) -> "Walls":

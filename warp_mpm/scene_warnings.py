@@ -7,20 +7,40 @@ import numpy as np
 from warp_mpm.charges import charge_warnings
 from warp_mpm.detonators import Detonator, PointDetonator
 from warp_mpm.exact.arrival import straight_arrival
+from warp_mpm.geometry import Solid
 from warp_mpm.lattice import Lattice
 from warp_mpm.scene import Charge, Domain
 
 FEW_CELLS = 5.0  # across an explosive: its waves are as wide
+NOTABLE_LOSS = 0.03  # of an explosive's volume, to charges added before it
 SPANS = 1.0 - 1e-9  # of the domain's length: such a charge goes from wall to wall, and may be one cell thick
 MICROSECOND = 1e-6  # [s]
+LEAST_PASCALS = 1e3  # of an ambient pressure: what is less, and not vacuum, may be in bar
 
 
 def scene_warnings(
-    charges: Sequence[Charge], detonators: Sequence[Detonator], domain: Domain, end_time: float
+    charges: Sequence[Charge],
+    wanted: Sequence[Solid],
+    detonators: Sequence[Detonator],
+    domain: Domain,
+    end_time: float,
+    ambient_pressure: float,
 ) -> tuple[str, ...]:
-    """Warnings of materials, of charges that cells resolve poorly, and of detonators that light nothing."""
+    """Warnings of materials, odd units, charges that lose room or that cells resolve poorly, idle detonators.
+
+    Args:
+        charges: as they fill what earlier ones leave free.
+        wanted: the solids that they were given, in the same order.
+        detonators: what lights them.
+        domain: the cells.
+        end_time: [s].
+        ambient_pressure: outside open faces [Pa].
+    """
     said = [warning for charge in charges for warning in charge_warnings(charge, _site_volume(charge, domain))]
     said = list(dict.fromkeys(said))  # what charges of one material have in common is said once
+    if 0.0 < ambient_pressure < LEAST_PASCALS:
+        said.append(f"ambient pressure {ambient_pressure:g} Pa: is it in pascals? 1 bar is 1e5 Pa")
+    said += _lost_room(charges, wanted, domain)
     late = [number for number, one in enumerate(detonators, start=1) if one.time >= end_time]
     spent = [
         n for n, one in enumerate(detonators, start=1) if one.time < end_time and _is_spent(one, detonators, charges)
@@ -39,6 +59,23 @@ def scene_warnings(
                 "pressures mean little; choose a smaller cell size"
             )
     return tuple(said)
+
+
+def _lost_room(charges: Sequence[Charge], wanted: Sequence[Solid], domain: Domain) -> list[str]:
+    """What to say of explosives that lose a notable part to charges before them, told from their lattices' sites."""
+    said = []
+    for number, (charge, solid) in enumerate(zip(charges, wanted, strict=True)):
+        if charge.material.burn is None or charge.solid is solid:
+            continue
+        sites = Lattice(domain, charge.particles_per_axis).sites_in(solid)
+        lost = sites[~charge.solid.contains(sites)]
+        if len(lost) > NOTABLE_LOSS * len(sites):
+            takers = [repr(other.name) for other in charges[:number] if other.solid.contains(lost).any()]
+            said.append(
+                f"charge {charge.name!r}: {len(lost) / len(sites):.0%} of it is left out, because it lies in "
+                f"{', '.join(takers)}, added before it; if that is not meant, move it, or add it before them"
+            )
+    return said
 
 
 def _site_volume(charge: Charge, domain: Domain) -> float:

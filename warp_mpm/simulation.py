@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from warp_mpm.section import section_pressure
 from warp_mpm.solver import Solver
 from warp_mpm.state import State
 from warp_mpm.stopping import StopRequest
-from warp_mpm.summary import figures_of_merit
+from warp_mpm.summary import figures_of_merit, gauge_warnings
 from warp_mpm.version import VERSION
 
 GROWTH = 1.1  # of the time step, at most; as in kernels.reduce
@@ -44,11 +44,11 @@ STEPS_AT_ONCE = 4  # on a GPU, so that the drift between two looks at it stays b
 class Result:
     """What a run gives back."""
 
-    summary: dict[str, Any]  # as in summary.json
-    history: list[dict[str, float]]  # as in history.csv, one row a frame
-    record: StepRecord  # every step
-    pictures: tuple[SectionPicture, ...]  # the section at the scene's picture instants
-    state: State  # at the end
+    summary: dict[str, Any] = field(repr=False)  # as in summary.json
+    history: list[dict[str, float]] = field(repr=False)  # as in history.csv, one row a frame
+    record: StepRecord = field(repr=False)  # every step
+    pictures: tuple[SectionPicture, ...] = field(repr=False)  # the section at the scene's picture instants
+    state: State = field(repr=False)  # at the end
     output: Path | None  # the run directory
 
 
@@ -75,7 +75,7 @@ def simulate(
         output: directory for the results, made if need be; nothing is written without it.
         device: "cpu", "cuda:0", ...; a GPU if there is one.
         threads: on a CPU; one a core.
-        progress: told how far the run is.
+        progress: told how far the run is, and closed; `progress_on()` shows it.
         resume: go on from the last checkpoint in `output`, as if the run had never stopped.
 
     Raises:
@@ -96,6 +96,7 @@ def simulate(
         raise SimulationError(f"{error}{run.checkpoints.remedy()}") from error
     finally:
         run.launcher.close()
+        run.progress.close()
     result = run.finish("complete")
     run.checkpoints.remove()
     return result
@@ -350,6 +351,7 @@ class _Run:
     def _summary(self, record: StepRecord) -> dict[str, Any]:
         clock = self.state.clock_values()
         final = self.history[-1]
+        warnings = [*self.scene.warnings, *self.warnings, *self._frame_warnings(), *clamp_warnings(self.audit)]
         return {
             **self._given(),
             "steps": self.steps,
@@ -371,7 +373,7 @@ class _Run:
             "pressure_spread": final["pressure_spread"],
             "sparse_share": final["sparse_share"],
             "particle_volume_error": self._volume_error(),
-            "warnings": [*self.scene.warnings, *self.warnings, *self._frame_warnings(), *clamp_warnings(self.audit)],
+            "warnings": [*warnings, *gauge_warnings(self.scene, record)],
         }
 
     def _volume_error(self) -> float | None:

@@ -181,6 +181,16 @@ def gauge_figures(scene: Scene, record: StepRecord, material: Material | None) -
     return figures
 
 
+def gauge_warnings(scene: Scene, record: StepRecord) -> list[str]:
+    """What to warn of fixed gauges that saw no matter: their zeros are those of vacuum."""
+    fixed = [gauge.name for gauge in scene.gauges if not gauge.moving]
+    unseen = [name for name in fixed if not record.gauges[name].density.any()]
+    if not unseen:
+        return []
+    names, end = ", ".join(repr(name) for name in unseen), f"{record.time[-1] * 1e6:g} us"
+    return [f"gauges: nothing came to {names} before {end}, it was in vacuum; move it towards a charge, or end later"]
+
+
 def _gauge_threshold(scene: Scene, name: str, pressure: np.ndarray, material: Material | None) -> float | None:
     """Pressure at which the front has arrived at a gauge that saw pressures (steps,) [Pa]; None if none can have."""
     if material is None or material.cj is None:

@@ -12,8 +12,9 @@ LONGEST_SILENCE = 30.0  # [s]
 MICROSECOND = 1e-6  # [s]
 
 
-def progress_on(console: Console) -> ProgressProtocol:
-    """A bar if the console is a terminal, else plain lines."""
+def progress_on(console: Console | None = None) -> ProgressProtocol:
+    """A bar if the console, standard output if not given, is a terminal, else plain lines; for `simulate`."""
+    console = console or Console()
     return ProgressBar(console) if console.is_terminal else ProgressLines(console)
 
 

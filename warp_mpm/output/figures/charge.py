@@ -1,7 +1,7 @@
 """The charges at the start, their sizes, and the detonators."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from warp_mpm.detonators import PlaneDetonator
 from warp_mpm.output.figures.cells import Cells, charge_cells, joined
@@ -31,7 +32,8 @@ from warp_mpm.scene import Wall
 TINTS = ("#e4cf9f", "#b4c8de", "#d3b9d6", "#bcd6b8", "#d9b8a6")  # of charges, light enough for what is written on them
 SHADES = {"in front": 1.0, "beside": 0.84, "above": 0.93}  # of faces, by where they look
 GAUGE = "#b5367a"  # their crosses and names
-MOST_TIMES, MOST_NUMBERS = 6, 24  # of detonators: with more the labels would lie on top of each other
+MOST_TIMES, MOST_NUMBERS = 6, 24  # of detonators, the latter of gauges too: more labels would have no room
+NAME_OFFSET, NAME_STEP = (5.0, -4.0), 3.0  # of gauges' names from their crosses, and further down [points]
 SIZE = 4.6  # of the longer side of the drawing [inch]
 
 
@@ -59,10 +61,10 @@ def charge_figure(run: Run) -> Figure:
         draw_edges(axes, view, line, colors="0.35", linewidths=0.7, linestyles=(0, (8, 3, 1, 3)))
     draw_detonators(axes, view, setup, np.array([lower, upper]), np.inf)
     _label_detonators(axes, run, view)
-    _draw_gauges(axes, run, view)
     _label_box(axes, view, lower, upper)
     draw_scale(axes, view, window, length=False)
     axes.text(1.05, 0.5, _words(run), transform=axes.transAxes, fontsize=8.0, va="center", linespacing=1.6)
+    _draw_gauges(axes, run, view)  # last: their names go where there is room
     return figure
 
 
@@ -116,15 +118,34 @@ def _label_detonators(axes: Axes, run: Run, view: View) -> None:
 
 
 def _draw_gauges(axes: Axes, run: Run, view: View) -> None:
-    """A cross at each gauge, and the names of those that are there."""
+    """A cross at each gauge, and the names of those that are there; of many places every few alone.
+
+    A name that would lie on a cross or on another text goes down until it does not, with a line from its cross to it.
+    """
     names: dict[tuple[float, ...], list[str]] = {}
     for gauge in setup_of(run).gauges:
         names.setdefault(gauge.position, []).append(gauge.name)
-    for position, there in names.items():
-        x, y = view.project(np.array(position)) / MILLIMETRE
-        axes.plot(x, y, "x", markersize=4.0, color=GAUGE, markeredgewidth=1.0, zorder=5)
-        text, offset = ",\n".join(there), (5.0, -4.0)
-        axes.annotate(text, (x, y), offset, textcoords="offset points", va="top", fontsize=7.0, color=GAUGE)
+    every = math.ceil(len(names) / MOST_NUMBERS)
+    taken, waiting = [text.get_window_extent() for text in axes.texts], []
+    for index, (position, there) in enumerate(names.items()):
+        place = view.project(np.array(position)) / MILLIMETRE
+        (cross,) = axes.plot(*place, "x", markersize=4.0, color=GAUGE, markeredgewidth=1.0, zorder=5)
+        taken.append(cross.get_window_extent())
+        if index in (0, len(names) - 1) or index % every == 0:
+            waiting.append((",\n".join(there), place))
+    for text, place in sorted(waiting, key=lambda one: -one[1][0]):  # so that lines pass other names on the left
+        taken.append(_name_gauges(axes, text, place, taken))
+
+
+def _name_gauges(axes: Axes, text: str, place: np.ndarray, taken: Sequence[Bbox]) -> Bbox:
+    """Write names at a place [mm], clear of what is taken; returns where they are."""
+    label = axes.annotate(text, place, NAME_OFFSET, textcoords="offset points", va="top", fontsize=7.0, color=GAUGE)
+    while (box := label.get_window_extent()).count_overlaps(taken):
+        label.set_position((NAME_OFFSET[0], label.get_position()[1] - NAME_STEP))
+    if label.get_position() != NAME_OFFSET:
+        line = {"arrowstyle": "-", "linewidth": 0.4, "color": GAUGE, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", place, (0.0, 0.5), textcoords=label, arrowprops=line)
+    return box
 
 
 def _label_box(axes: Axes, view: View, lower: np.ndarray, upper: np.ndarray) -> None:
