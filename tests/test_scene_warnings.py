@@ -12,6 +12,7 @@ from warp_mpm.detonators import PointDetonator, row
 from warp_mpm.geometry import Box, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.parameters import closest_match
+from warp_mpm.progress import opening
 from warp_mpm.scene import Scene
 
 LENGTH = 20 * CELL
@@ -144,3 +145,11 @@ def test_a_reader_who_has_seen_enough():
         program.stdout.close()
         said = program.stderr.read()
     assert (program.returncode, said) == (0, b"")
+
+
+def test_a_run_begins_with_the_warnings_of_its_scene():
+    """Before its first step: a long run need not be waited for."""
+    (said,) = bar(at(0.0, 2.0)).warnings
+    first, *warnings = opening(bar(at(0.0, 2.0)), "CPU", 1).splitlines()
+    assert first == "bar: 160 particles in 20 cells on CPU, 1 thread, in single precision; preparing kernels"
+    assert warnings == [f"warning: {said}"]

@@ -1,6 +1,10 @@
 """What a long run tells the person who waits for it."""
 
+import math
 from typing import Protocol
+
+from warp_mpm.kernels.precision import PRECISION
+from warp_mpm.scene import Scene
 
 
 class Progress(Protocol):
@@ -27,3 +31,11 @@ class Silent:
 
     def close(self) -> None:
         """Nothing to close."""
+
+
+def opening(scene: Scene, device: str, threads: int) -> str:
+    """What a run begins with: how large it is, where it is computed, and what is odd about the scene."""
+    shared = f"{threads} thread" + ("" if threads == 1 else "s")
+    size = f"{scene.particle_count:,} particles in {math.prod(scene.domain.cells):,} cells"
+    first = f"{scene.name}: {size} on {device}, {shared}, in {PRECISION} precision; preparing kernels"
+    return "\n".join([first, *(f"warning: {text}" for text in scene.warnings)])

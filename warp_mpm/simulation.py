@@ -24,7 +24,7 @@ from warp_mpm.launch import Launcher, find_device
 from warp_mpm.model import Model, build_model
 from warp_mpm.output.description import scene_values
 from warp_mpm.output.frame import Frame, SectionPicture, StepRecord
-from warp_mpm.progress import Progress, Silent
+from warp_mpm.progress import Progress, Silent, opening
 from warp_mpm.recorder import Recorder
 from warp_mpm.run_directory import FIGURES, STEPS, SUMMARY, load, remove_results
 from warp_mpm.scene import Scene, Wall
@@ -130,11 +130,7 @@ class _Run:
         check_memory(self.model)
         self.checkpoints = Checkpoints(self.output, self._identity(config), save)
         saved = self.checkpoints.read() if resume else None
-        progress.message(
-            f"{scene.name}: {scene.particle_count:,} particles in {math.prod(scene.domain.cells):,} cells on "
-            f"{self.launcher.device.name}, {_counted(self.launcher.threads, 'thread')}, in {PRECISION} precision; "
-            "preparing kernels"
-        )
+        progress.message(opening(scene, self.launcher.device.name, self.launcher.threads))
         self.state = State(self.model, self.launcher)
         self.solver = Solver(self.model, self.state, self.launcher)
         self.recorder = Recorder(self.state)
@@ -393,7 +389,3 @@ def _solver_values(model: Model) -> dict[str, Any]:
     values = {item.name: getattr(model.config, item.name) for item in fields(model.config)}
     values = {name: value.value if isinstance(value, Enum) else value for name, value in values.items()}
     return {**values, "burn_width": model.burn_width}
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" + ("" if count == 1 else "s")
