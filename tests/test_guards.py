@@ -9,18 +9,21 @@ import sys
 
 import numpy as np
 import pytest
-from scenes_for_tests import CELL, OPEN, block, inert_gas, start
+import warp as wp
+from scenes_for_tests import CELL, OPEN, ORDERS_AND_TRANSFERS, block, inert_gas, start
 
 from warp_mpm import guards, simulation
-from warp_mpm.config import Save
+from warp_mpm.config import Save, SolverConfig
 from warp_mpm.conservation import Audit, totals_of
 from warp_mpm.errors import SimulationError
 from warp_mpm.kernels.records import CLAMPED_ENERGY
+from warp_mpm.launch import find_device
+from warp_mpm.model import build_model
 from warp_mpm.output.checkpoint import checkpoint_files, read_checkpoint
 from warp_mpm.progress import Silent
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import simulate
-from warp_mpm.state import State
+from warp_mpm.state import State, memory_needed
 
 SPOILT = {
     "velocity": (np.nan, "got nan (kg/m3|J/kg)"),  # it spreads to its nodes and neighbors, of which one is named
@@ -142,3 +145,19 @@ def test_a_full_disk_is_one_line_and_leaves_what_was_there(tmp_path, file, limit
     names = [name for _, _, files in os.walk(tmp_path) for name in files]
     assert "summary.json" in names
     assert [name for name in names if ".part" in name or name == file] == []
+
+
+@pytest.mark.parametrize("material", [None, inert_gas()], ids=["explosive", "inert"])
+@pytest.mark.parametrize(("order", "transfer"), ORDERS_AND_TRANSFERS)
+def test_the_memory_that_a_state_needs_is_what_it_takes(order, transfer, material, device):
+    """All arrays with an entry for each particle or node, to a few bytes: some have a node to spare."""
+    config = SolverConfig(order=order, transfer=transfer)
+    model = build_model(block((5, 4, 3), material=material, margin_cells=1), config, find_device(device))
+    state = State(model)
+    arrays = [value for holder in (state.grid, state.particles, state) for value in vars(holder).values()]
+    taken = sum(
+        array.size * wp.types.type_size_in_bytes(array.dtype)
+        for array in arrays
+        if isinstance(array, wp.array) and array.size >= state.count
+    )
+    assert taken == pytest.approx(memory_needed(model), abs=64)

@@ -192,7 +192,8 @@ class State:
 
 def memory_needed(model: Model) -> int:
     """Bytes that a state of this model takes on its device."""
-    records = sum(record.numpy_dtype()["itemsize"] for record in RECORDS.values())
+    kept = [record for record in RECORDS.values() if record is not BurnTimes or model.burns]
+    records = sum(record.numpy_dtype()["itemsize"] for record in kept)
     affine = 9 * NUMBER.itemsize if model.affine else 0
     particle = records + affine + 4 + 26  # its index; the keys and the scratch of the sort
     musl = model.config.order is Order.MUSL
@@ -207,7 +208,7 @@ def _allocate_grid(model: Model) -> Grid:
     total = counts[0] * counts[1] * counts[2]
     grid = Grid()
     reprojected = total if model.config.order is Order.MUSL else 0
-    spare = 1  # see `kernels/rows.py`
+    spare = 1  # of what is scattered in rows that end within a vector: see `kernels/rows.py`
     grid.sums = _sparse_zeros(total, vector8, model.device)
     grid.field = _sparse_zeros(total + spare, vector2, model.device)
     grid.content_sums = _sparse_zeros(total if model.damped else 0, vector2, model.device)
@@ -215,7 +216,7 @@ def _allocate_grid(model: Model) -> Grid:
     grid.start = _sparse_zeros(total, vector8, model.device)
     grid.reprojected = _sparse_zeros(reprojected + spare, vector4, model.device)
     grid.end = _sparse_zeros(reprojected, vector8, model.device)
-    grid.damping = _sparse_zeros(reprojected + spare, vector4, model.device)
+    grid.damping = _sparse_zeros(reprojected, vector4, model.device)
     blocks = [-(-n // EDGE) for n in counts]
     grid.stamps = wp.full(blocks[0] * blocks[1] * blocks[2], NO_STEP, dtype=int, device=model.device)
     grid.blocks = wp.vec3i(*blocks)
