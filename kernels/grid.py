@@ -165,7 +165,10 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
 
     @wp.func
     def forget(grid: Grid, n: int):
-        """A node that no particle reaches any more: neighbours may still look at it, a wall's fold at a ghost."""
+        """A node that no particle reaches any more: neighbours may still look at it, a wall's fold at a ghost.
+
+        The start of such a ghost its owner may write at the same time, but nobody reads it before it is written anew.
+        """
         grid.start[n] = vector8()
         if wp.static(reprojects):
             grid.reprojected[n] = vector4()
