@@ -30,7 +30,6 @@ single = wp.float32  # of surfaces of triangles, which Warp searches in this pre
 single_vector3 = wp.vec3f
 
 ZERO = wp.constant(scalar(0.0))
-QUARTER = wp.constant(scalar(0.25))
 HALF = wp.constant(scalar(0.5))
 THREE_QUARTERS = wp.constant(scalar(0.75))
 ONE = wp.constant(scalar(1.0))

@@ -8,7 +8,7 @@ changes their volumes (`sharpen.py`), and the viscosity is a tensor (`viscosity.
 The conservative damping moves a particle's velocity vF towards what the grid sees, by u = sum w alpha (v_r - vF), alpha
 a number of each node that follows its sound speed: momentum is exact, because at a node the sum of w m (v_r - vF) is
 zero. The kinetic energy that this takes, sum over the nodes of 2 alpha (K - M |v_r|^2 / 2) less sum over the particles
-of m |u|^2 / 2, returns as heat: the nodes' part by the weights (see `grid.py`), the particles' part to each its own.
+of m |u|^2 / 2, returns as heat: the nodes' part by the weights (see `reproject.py`), the particles' to each its own.
 """
 
 import functools

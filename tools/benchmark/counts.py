@@ -9,8 +9,8 @@ division or a root counts as one, too. With a stencil of w nodes an axis and val
 
     gather            L (w^3 + w^2 + w)           rows, planes, then all of it: see `kernels/stencil.py`
     gather_gradient   L (2 w^3 + 3 w^2 + 4 w)     two sums along a row, three across, four over planes
-    scatter           L (w^3 + w^2)               a multiple for each row, added to each node
-    scatter_gradient  L (2 w^3 + 4 w^2)
+    scatter           L (w^3 + w)                 a multiple for each node of a row, added to all rows
+    scatter_gradient  L (2 w^3 + 3 w^2 + 4 w)
     weights           12 w                        3 axes, w weights and w slopes of two operations each
 
 What comes on top, such as the equation of state, is counted by hand from the kernels, to some ten per cent.
