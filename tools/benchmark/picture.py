@@ -24,6 +24,7 @@ NS = "ns_per_particle_step"
 COLORS = ("#56b4e9", "#0072b2", "#009e73", "#f0e442", "#d55e00", "#333333", "#e69f00", "#cc79a7")
 DARK = {"#0072b2", "#009e73", "#d55e00", "#333333"}  # on which white is read better
 OTHERS, OTHERS_COLOR = "the rest", "#c8c8c8"
+LEAST_SHOWN = 0.01  # of the longest phase: what takes less has no colour of its own
 LINE = "#0072b2"
 FAINT = "#777777"
 SHORTEST_LABELLED = 0.05  # of the axis
@@ -65,7 +66,8 @@ def phase_colors(report: Record) -> dict[str, str]:
     longest: dict[str, float] = {}
     for row in (row for table in tables for row in table if row["phase"] != SORT):
         longest[row["phase"]] = max(longest.get(row["phase"], 0.0), row[NS])
-    shown = sorted(longest, key=lambda name: -longest[name])[: len(COLORS)]
+    notable = [name for name, time in longest.items() if time > LEAST_SHOWN * max(longest.values())]
+    shown = sorted(notable, key=lambda name: -longest[name])[: len(COLORS)]
     order = [name for name in longest if name in shown]
     return {**dict(zip(order, COLORS, strict=False)), OTHERS: OTHERS_COLOR}
 
