@@ -94,7 +94,7 @@ def set_end(solver, moving, working, alpha, reprojected, heat):
     end = np.concatenate([moving, mass[:, None], working, alpha[:, None]], axis=1)
     damping = np.concatenate([reprojected, np.full((count, 1), heat)], axis=1)
     solver.state.grid.end.assign(end.astype(np.float32))
-    solver.state.grid.damping.assign(np.append(damping, [[0.0] * 4], axis=0).astype(np.float32))
+    solver.state.grid.damping.assign(damping.astype(np.float32))
 
 
 def set_time_step(state):
