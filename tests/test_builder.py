@@ -232,7 +232,7 @@ CALLS = [
     (lambda b: b.domain((0, 0, 0), (1, 1, 1), cell_size=1, margins=-1), "domain: margins: expected a number of at lea"),
     (lambda b: b.walls("open"), "walls: expected a Walls, got 'open'"),
     (lambda b: b.charge("box", EXPLOSIVE), "charge 'charge_2': solid: expected a Solid"),
-    (lambda b: b.charge(CUBE, "tnt"), "charge 'charge_2': material: expected a Material, got 'tnt'"),
+    (lambda b: b.charge(CUBE, "tnt"), "charge 'charge_2': material: expected a Material, got 'tnt'; find_material()"),
     (lambda b: b.charge(CUBE, EXPLOSIVE, name="cube"), "charge 'cube': expected a name of its own"),
     (lambda b: b.charge(CUBE, EXPLOSIVE, particles_per_axis=0), "particles_per_axis: expected a whole number of at le"),
     (lambda b: b.detonator((0, 0, 0)), "detonator 2: expected a PointDetonator, LineDetonator"),

@@ -152,7 +152,8 @@ class SceneBuilder:
             raise mistake(
                 f"{here}: solid", "one that has an end", "one without", "intersect it with a box: solid & Box"
             )
-        checks.instance(f"{here}: material", material, Material, "a Material")
+        remedy = "find_material() looks one up by its name, explosive() makes one"
+        checks.instance(f"{here}: material", material, Material, "a Material", remedy)
         per_axis = checks.count(f"{here}: particles_per_axis", particles_per_axis)
         if velocity is not None and not callable(velocity):
             velocity = checks.vector(
