@@ -122,7 +122,8 @@ def fold_kernel(momentum: bool, force: bool) -> wp.Kernel:
             force_left[2],
             total[7],
         )
-        grid.field[n] = field
+        if wp.static(force):
+            grid.field[n] = field
 
     return node_kernel(fold, None, 0)
 

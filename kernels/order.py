@@ -34,7 +34,11 @@ def sort_keys(
     keys: wp.array(dtype=wp.int64),
     order: wp.array(dtype=int),
 ):
-    """Key of each particle: (slab x charges + charge) x cells + cell. Particles that left come last."""
+    """Key of each particle: (slab x charges + charge) x cells + cell. Particles that left come last.
+
+    Cells are counted through a slab along its thin axis first, then along z: the nodes that a line of cells shares with
+    the next one are then still in the cache.
+    """
     p = wp.tid()
     cell = particles.position[p].cell
     cells = wp.int64(grid.cells[0]) * wp.int64(grid.cells[1]) * wp.int64(grid.cells[2])

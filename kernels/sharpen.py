@@ -88,7 +88,10 @@ def weight_at(grid: Grid, boundary: Boundary, axis: int, at: int) -> scalar:
 
 @functools.cache
 def excess_function(value_of: wp.Function, mass_of: wp.Function) -> wp.Function:
-    """Device function: sum of min(M_i, M_j) (x_i - x_j) over the neighbours of any node."""
+    """Device function: sum of min(M_i, M_j) (x_i - x_j) over the neighbours of any node.
+
+    x is value_of(grid, boundary, n, dt), M is mass_of(grid, n), n a node's flat index.
+    """
 
     @wp.func
     def excess(grid: Grid, boundary: Boundary, index: wp.vec3i, dt: scalar) -> vector8:

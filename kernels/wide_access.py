@@ -4,6 +4,8 @@ It must be told that they are aligned as much, as nodes are; Warp's vectors are 
 the manual of PTX) needs single precision and compute capability 9.0. Elsewhere, and on a CPU, this is what Warp does.
 """
 
+from collections.abc import Callable
+
 from warp_mpm.kernels.precision import BYTES, REAL
 
 WIDEST = 16  # bytes
@@ -34,7 +36,7 @@ def wide_access(lanes: int) -> str:
 """
 
 
-def _per_piece(lanes: int, size: int, body) -> str:
+def _per_piece(lanes: int, size: int, body: Callable[[int, int], str]) -> str:
     return "\n".join(body(first, size) for first in range(0, lanes, size))
 
 

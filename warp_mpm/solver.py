@@ -66,13 +66,13 @@ class Solver:
         yield "collect reactions", self._collect_reactions.launch
         yield "grid to particles and back", lambda: self._over_slabs(self._advance)
         if musl:
-            yield "fold re-projection", lambda: self._over_walls(self._fold_reprojected)
+            yield "fold re-projection", lambda: self._over_nodes(self._fold_reprojected)
             yield "solve re-projection", lambda: self._over_nodes(self._solve_reprojected)
         yield "strain and material", lambda: self._over_particles(self._update)
         if not musl:
             yield "clear", lambda: self._over_nodes(self._clear)
         yield "particles to grid", lambda: self._over_slabs(self._scatter_all)
-        yield "fold grid", lambda: self._over_walls(self._fold_all)
+        yield "fold grid", lambda: self._over_nodes(self._fold_all)
         yield "solve grid", lambda: self._over_nodes(self._solve_all)
         yield "end of step", self._end_step.launch
 
@@ -80,11 +80,11 @@ class Solver:
         yield "time step", self._start_step.launch
         yield "clear", lambda: self._over_nodes(self._clear)
         yield "momentum to grid", lambda: self._over_slabs(self._scatter_momentum)
-        yield "fold momentum", lambda: self._over_walls(self._fold_momentum)
+        yield "fold momentum", lambda: self._over_nodes(self._fold_momentum)
         yield "solve momentum", lambda: self._over_nodes(self._solve_momentum)
         yield "strain and material", lambda: self._over_particles(self._update)
         yield "forces to grid", lambda: self._over_slabs(self._scatter_force)
-        yield "fold forces", lambda: self._over_walls(self._fold_force)
+        yield "fold forces", lambda: self._over_nodes(self._fold_force)
         yield "solve forces", lambda: self._over_nodes(self._solve_all)
         yield "collect reactions", self._collect_reactions.launch
         yield "grid to particles", lambda: self._over_slabs(self._advance)
@@ -139,7 +139,7 @@ class Solver:
                 device=model.device,
             )
         self._over_slabs(self._scatter_all)
-        self._over_walls(self._fold_all)
+        self._over_nodes(self._fold_all)
         self._over_nodes(self._solve_all)
         if any(charge.velocities is not None for charge in model.scene.charges):
             kernel = initial_strain_kernel(model.shape)
@@ -162,11 +162,6 @@ class Solver:
     def _over_nodes(self, tasks: list[Task]) -> None:
         """Work on nodes."""
         self.launcher.run(tasks, NODES * self.state.blocks)
-
-    def _over_walls(self, tasks: list[Task]) -> None:
-        """Work on the nodes at walls."""
-        if self.model.has_walls:
-            self._over_nodes(tasks)
 
     def _groups(self) -> Iterator[tuple[int, ChargeModel, int, int]]:
         """Slab, charge, first particle and number of particles of each group that has any."""
@@ -259,17 +254,17 @@ class Solver:
         order, damped, sharpened = model.config.order, model.damped, model.sharpened
 
         musl = order is Order.MUSL
-        self._fold_all = self._per_slot(fold.fold_kernel(True, True), phase)
+        self._fold_all = self._at_walls(fold.fold_kernel(True, True), phase)
         self._solve_all = self._per_slot(grid_kernels.solve_kernel(True, damped, sharpened, musl), phase)
         if musl:
-            self._fold_reprojected = self._per_slot(fold.fold_reprojected_kernel(), reprojection)
+            self._fold_reprojected = self._at_walls(fold.fold_reprojected_kernel(), reprojection)
             kernel = reproject.solve_reprojected_kernel(sharpened, damped)
             self._solve_reprojected = self._per_slot(kernel, reprojection)
         else:
             self._clear = self._per_slot(reproject.clear_kernel(), phase)
         if order is Order.USF:
-            self._fold_momentum = self._per_slot(fold.fold_kernel(True, False), phase)
-            self._fold_force = self._per_slot(fold.fold_kernel(False, True), phase)
+            self._fold_momentum = self._at_walls(fold.fold_kernel(True, False), phase)
+            self._fold_force = self._at_walls(fold.fold_kernel(False, True), phase)
             self._solve_momentum = self._per_slot(grid_kernels.solve_kernel(False, damped, sharpened, False), phase)
 
     def _per_slab(self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]]) -> list[Task]:
@@ -279,6 +274,10 @@ class Solver:
             kernel, inputs = phase(slab, charge)
             tasks[slab].append(self.launcher.record(kernel, count, [*inputs, begin]))
         return list(tasks)
+
+    def _at_walls(self, kernel: wp.Kernel, phase: Phase) -> list[Task]:
+        """Work on the nodes at walls; none, and nothing to compile, without walls."""
+        return self._per_slot(kernel, phase) if self.model.has_walls else []
 
     def _per_slot(self, kernel: wp.Kernel, phase: Phase) -> list[Task]:
         """The blocks of nodes, cut into as many tasks as there are slots."""
