@@ -80,9 +80,9 @@ def tents_around(grid: Grid, cell: wp.vec3s, fraction: vector3) -> Tents:
 
 
 @wp.func
-def scatter_content(grid: Grid, cell: wp.vec3s, fraction: vector3, pressure: scalar, volume: scalar):
-    """Particle -> cells: sum L V p [J] and sum L V [m3]."""
-    scatter_cells(tents_around(grid, cell, fraction), grid.content_sums, vector2(pressure * volume, volume))
+def scatter_content(grid: Grid, cell: wp.vec3s, fraction: vector3, given: vector2):
+    """Particle -> cells: sum L V p [J] and sum L V [m3], of a particle's V p and V."""
+    scatter_cells(tents_around(grid, cell, fraction), grid.content_sums, given)
 
 
 @wp.func

@@ -11,7 +11,8 @@ import warp as wp
 
 from warp_mpm.kernels.blocks import stamp_blocks
 from warp_mpm.kernels.content import lowest_cell, scatter_content
-from warp_mpm.kernels.precision import HALF, ONE, ZERO, matrix3, scalar, vector2, vector3, vector4, vector8
+from warp_mpm.kernels.contribution import contribution_function, force_on, momentum_on, reprojected
+from warp_mpm.kernels.precision import ONE, ZERO, matrix3, scalar, vector3
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.stencil import (
@@ -150,25 +151,17 @@ def affine_gradient_function(shape: Shape) -> wp.Function:
     return affine_gradient
 
 
-@wp.func
-def force_on(force: vector3) -> vector8:
-    """A force in the lanes of a node."""
-    return vector8(ZERO, ZERO, ZERO, ZERO, force[0], force[1], force[2], ZERO)
-
-
 @functools.cache
 def scatter_kernel(
     shape: Shape, momentum: bool, force: bool, affine: bool, content: bool, thin: bool = False
 ) -> wp.Kernel:
-    """Particles -> nodes: momentum, mass and volume (`momentum`); internal force and field pressure (`force`).
-
-    sum w m, sum w m v (APIC: v + C (x_i - x_p)), sum w V; f = sum V (p + q - p_ambient + s s^T) grad w, q and s s^T
-    the isotropic and the directed part of the artificial viscosity, sum w V p, sum w m c^2; and to the
-    cells sum L V p, sum L V (`content`).
+    """Particles -> nodes: momentum, mass and volume (`momentum`); internal force and field (`force`); and to the
+    cells (`content`). The sums are those of `contribution.py`.
     """
     width = shape.width
     stencil_of = stencil_function(shape)
     node_offset = node_offset_function(shape)
+    contribution = contribution_function(momentum, force)
     scatter_gradient = scatter_gradient_function(width, 8)
     scatter_field = scatter_function(width, 2)
     look_ahead = look_ahead_function(shape, Ahead.SUMS)
@@ -195,25 +188,12 @@ def scatter_kernel(
         fraction = position.fraction
         stencil = stencil_of(grid, cell, fraction, half_width)
         stamp_blocks(grid, lowest_cell(cell, fraction), clock[0].step)
-        volume = mass / matter.density
-        pressure_volume = matter.pressure * volume
-        scattered = vector8()
-        force_x = vector3()  # V sigma, column by column
-        force_y = vector3()
-        force_z = vector3()
-        if wp.static(momentum):
-            carried = mass * motion.velocity
-            scattered = vector8(carried[0], carried[1], carried[2], mass, ZERO, ZERO, ZERO, volume)
+        given = contribution(motion.velocity, mass, matter, ambient_pressure)
         if wp.static(force):
-            push = pressure_volume + (matter.viscous_pressure - ambient_pressure) * volume
-            thrust = matter.viscous_thrust
-            directed = volume * thrust
-            force_x = directed[0] * thrust + vector3(push, ZERO, ZERO)
-            force_y = directed[1] * thrust + vector3(ZERO, push, ZERO)
-            force_z = directed[2] * thrust + vector3(ZERO, ZERO, push)
-            elasticity = mass * matter.sound_speed * matter.sound_speed
-            scatter_field(stencil, grid.field, vector2(pressure_volume, elasticity))
-        scatter_gradient(stencil, grid.sums, scattered, force_on(force_x), force_on(force_y), force_on(force_z))
+            scatter_field(stencil, grid.field, given.field)
+        scatter_gradient(
+            stencil, grid.sums, given.value, force_on(given.force_x), force_on(given.force_y), force_on(given.force_z)
+        )
         if wp.static(affine and momentum):
             for i in range(width):
                 for j in range(width):
@@ -221,13 +201,9 @@ def scatter_kernel(
                         weight = mass * stencil.wx[i] * stencil.wy[j] * stencil.wz[k]
                         extra = weight * (particles.affine[p] * node_offset(grid, fraction, i, j, k))
                         node = stencil.first + i * grid.stride_x + j * grid.stride_y + k
-                        wp.atomic_add(
-                            grid.sums,
-                            node,
-                            vector8(extra[0], extra[1], extra[2], ZERO, ZERO, ZERO, ZERO, ZERO),
-                        )
+                        wp.atomic_add(grid.sums, node, momentum_on(extra))
         if wp.static(content):
-            scatter_content(grid, cell, fraction, matter.pressure, volume)
+            scatter_content(grid, cell, fraction, given.content)
 
     return scatter
 
@@ -283,12 +259,10 @@ def advance_kernel(shape: Shape, blend: bool, affine: bool, reproject: bool, thi
                     for k in range(width):
                         carried = velocity + gradient * node_offset(grid, fraction, i, j, k)
                         weight = mass * stencil.wx[i] * stencil.wy[j] * stencil.wz[k]
-                        value = vector4(carried[0], carried[1], carried[2], HALF * wp.dot(carried, carried))
                         node = stencil.first + i * grid.stride_x + j * grid.stride_y + k
-                        wp.atomic_add(grid.reprojected, node, weight * value)
+                        wp.atomic_add(grid.reprojected, node, weight * reprojected(carried))
         if wp.static(reproject and not affine):
-            kinetic = HALF * wp.dot(velocity, velocity)
-            scatter(stencil, grid.reprojected, mass * vector4(velocity[0], velocity[1], velocity[2], kinetic))
+            scatter(stencil, grid.reprojected, mass * reprojected(velocity))
 
     return advance
 

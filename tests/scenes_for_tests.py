@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -97,12 +98,17 @@ def start(
     *,
     threads: int = 1,
     graphs: bool | None = None,
+    ordered: bool | None = None,
     prepare: Callable[[State], None] | None = None,
     **config: Any,
 ) -> Solver:
-    """A solver at the start of a scene; `prepare` may change the particles before their first scatter."""
+    """A solver at the start of a scene; `prepare` may change the particles before their first scatter.
+
+    `ordered` lets a CPU sum as a GPU does for a reproducible answer, and a GPU without being asked.
+    """
     launcher = Launcher(find_device(device), threads, graphs)
-    state = State(build_model(scene, SolverConfig(**config), launcher.device))
+    model = build_model(scene, SolverConfig(**config), launcher.device)
+    state = State(model if ordered is None else replace(model, ordered=ordered))
     if prepare is not None:
         prepare(state)
     return Solver(state.model, state, launcher)

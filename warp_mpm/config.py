@@ -52,6 +52,7 @@ class SolverConfig:
     burn_width: float | None = None  # width of the burn zone [cells]; None: the scene's, else 0.5
     viscosity: tuple[float, float] = (1.5, 0.06)  # quadratic and linear coefficient of the artificial viscosity
     cfl: float = 0.3  # Courant number of the time step
+    reproducible: bool = False  # on a GPU: the same answer, bit for bit, on every run, for more time; a CPU's always is
 
     def __post_init__(self) -> None:
         """Check the values.
@@ -62,6 +63,7 @@ class SolverConfig:
         instance("solver: shape", self.shape, ShapeFunction, "a ShapeFunction, such as ShapeFunction.BSPLINE")
         instance("solver: order", self.order, Order, "an Order, such as Order.MUSL")
         instance("solver: transfer", self.transfer, Transfer, "a Transfer, such as Transfer.FLIP")
+        flag("solver: reproducible", self.reproducible)
         share_ok = is_number(self.pic_share) and 0.0 <= self.pic_share <= 1.0
         _check("pic_share", share_ok, "a share between 0 and 1", self.pic_share)
         if self.burn_width is not None:

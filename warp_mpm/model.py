@@ -88,6 +88,7 @@ class Model:
     faces: Faces
     viscosity: Viscosity
     slabs: Slabs
+    ordered: bool  # whether nodes sum in a fixed order what particles give; on a CPU the scatter's is fixed too
 
     @property
     def spacing(self) -> np.ndarray:
@@ -161,6 +162,7 @@ def build_model(scene: Scene, config: SolverConfig, device: wp.Device) -> Model:
         faces=_faces(scene),
         viscosity=_viscosity(scene, config),
         slabs=slabs,
+        ordered=config.reproducible and device.is_cuda,
     )
 
 

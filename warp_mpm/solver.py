@@ -6,7 +6,6 @@ before each solution, and both sharpen. The particles are scattered at the end o
 the grid belongs to the same instant as the particles.
 """
 
-import itertools
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -22,6 +21,7 @@ from warp_mpm.kernels.node_pass import Phase
 from warp_mpm.kernels.precision import vector3
 from warp_mpm.launch import Launcher, Task
 from warp_mpm.model import STRAINS, ChargeModel, Model
+from warp_mpm.ordered_sums import OrderedSums
 from warp_mpm.state import State
 
 THIN = 0.5  # nodes of active blocks to a particle from which on asking ahead pays; in a dense gas there are 0.2
@@ -38,6 +38,7 @@ class Solver:
         self.steps_since_sort = 0
         self.thin = False  # whether there were very few particles to a node when they were last sorted
         self._graph: wp.Graph | None = None
+        self._ordered = OrderedSums(state, launcher) if model.ordered else None
         self._record_clock()
         self._record_ranges()
         self._initialise()
@@ -66,12 +67,14 @@ class Solver:
         yield "collect reactions", self._collect_reactions.launch
         yield "grid to particles and back", lambda: self._over_slabs(self._advance)
         if musl:
+            if self._ordered is not None:
+                yield "momentum to grid", lambda: self._over_nodes(self._reproject)
             yield "fold re-projection", lambda: self._over_nodes(self._fold_reprojected)
             yield "solve re-projection", lambda: self._over_nodes(self._solve_reprojected)
         yield "strain and material", lambda: self._over_particles(self._update)
         if not musl:
             yield "clear", lambda: self._over_nodes(self._clear)
-        yield "particles to grid", lambda: self._over_slabs(self._scatter_all)
+        yield "particles to grid", lambda: self._to_grid(self._scatter_all)
         yield "fold grid", lambda: self._over_nodes(self._fold_all)
         yield "solve grid", lambda: self._over_nodes(self._solve_all)
         yield "end of step", self._end_step.launch
@@ -79,11 +82,11 @@ class Solver:
     def _phases_of_usf(self) -> Iterator[tuple[str, Callable[[], None]]]:
         yield "time step", self._start_step.launch
         yield "clear", lambda: self._over_nodes(self._clear)
-        yield "momentum to grid", lambda: self._over_slabs(self._scatter_momentum)
+        yield "momentum to grid", lambda: self._to_grid(self._scatter_momentum)
         yield "fold momentum", lambda: self._over_nodes(self._fold_momentum)
         yield "solve momentum", lambda: self._over_nodes(self._solve_momentum)
         yield "strain and material", lambda: self._over_particles(self._update)
-        yield "forces to grid", lambda: self._over_slabs(self._scatter_force)
+        yield "forces to grid", lambda: self._to_grid(self._scatter_force)
         yield "fold forces", lambda: self._over_nodes(self._fold_force)
         yield "solve forces", lambda: self._over_nodes(self._solve_all)
         yield "collect reactions", self._collect_reactions.launch
@@ -111,6 +114,8 @@ class Solver:
         self.steps_since_sort = steps_since_sort
         self.thin = thin
         self._record_ranges()
+        if self._ordered is not None:
+            self._ordered.fill()
 
     def audit(self) -> tuple[np.ndarray, float]:
         """Sums over the particles (`kernels.reduce` names the lanes), and the mass on the grid [kg]."""
@@ -138,7 +143,7 @@ class Solver:
                 ],
                 device=model.device,
             )
-        self._over_slabs(self._scatter_all)
+        self._to_grid(self._scatter_all)
         self._over_nodes(self._fold_all)
         self._over_nodes(self._solve_all)
         if any(charge.velocities is not None for charge in model.scene.charges):
@@ -149,6 +154,14 @@ class Solver:
         if model.config.order is Order.USF:  # which computes forces anew before it uses any
             state.reactions.zero_()
             state.pending_impulses.zero_()
+
+    def _to_grid(self, tasks: list[Task]) -> None:
+        """What particles give to nodes: from slab to slab, or node by node in a fixed order."""
+        if self._ordered is None:
+            self._over_slabs(tasks)
+        else:
+            self._ordered.fill()
+            self._over_nodes(tasks)
 
     def _over_slabs(self, tasks: list[Task]) -> None:
         """Particle work that writes to nodes: the even slabs, which share none, then the odd ones."""
@@ -198,12 +211,17 @@ class Solver:
         thin = self.thin
 
         def scatter(momentum: bool, force: bool) -> list[Task]:
+            if self._ordered is not None:
+                return self._ordered.scatter(momentum, force)
             kernel = transfer.scatter_kernel(shape, momentum, force, model.affine, model.damped, thin)
             return self._per_slab(
                 lambda slab, charge: (kernel, [state.particles, state.grid, state.clock, charge.half_width, ambient])
             )
 
-        advance = transfer.advance_kernel(shape, blend, model.affine, musl, thin)
+        reprojects = musl and self._ordered is None
+        if musl and self._ordered is not None:
+            self._reproject = self._ordered.reprojection()
+        advance = transfer.advance_kernel(shape, blend, model.affine, reprojects, thin)
         self._advance = self._per_slab(
             lambda slab, charge: (
                 advance,
@@ -280,12 +298,10 @@ class Solver:
         return self._per_slot(kernel, phase) if self.model.has_walls else []
 
     def _per_slot(self, kernel: wp.Kernel, phase: Phase) -> list[Task]:
-        """The blocks of nodes, cut into as many tasks as there are slots."""
+        """The blocks of nodes, piece by piece."""
         state = self.state
-        edges = [state.blocks * slot // state.slots for slot in range(state.slots + 1)]
         inputs = [state.grid, self.model.boundary, state.clock, phase]
         return [
-            [self.launcher.record(kernel, (end - begin) * state.grid.workers, [*inputs, slot, begin])]
-            for slot, (begin, end) in enumerate(itertools.pairwise(edges))
-            if end > begin
+            [self.launcher.record(kernel, count * state.grid.workers, [*inputs, slot, begin])]
+            for slot, begin, count in state.pieces()
         ]

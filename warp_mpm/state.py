@@ -1,5 +1,7 @@
 """The state: what changes while a scene is solved, in arrays on the device."""
 
+import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -69,7 +71,7 @@ class State:
         charge = np.repeat(
             np.arange(len(model.scene.charges), dtype=np.int16), [len(c.positions) for c in model.scene.charges]
         )
-        self._charge: wp.array = wp.array(charge, dtype=wp.int16, device=self.device)
+        self.charge: wp.array = wp.array(charge, dtype=wp.int16, device=self.device)
         # Twice the count: the sort uses the second half as its scratch.
         self._keys = wp.zeros(2 * self.count, dtype=wp.int64, device=self.device)
         self._order = wp.zeros(2 * self.count, dtype=int, device=self.device)
@@ -92,7 +94,7 @@ class State:
         wp.launch(
             order.sort_keys,
             n,
-            inputs=[self.particles, self.grid, model.slabs, self._charge, self._keys, self._order],
+            inputs=[self.particles, self.grid, model.slabs, self.charge, self._keys, self._order],
             device=self.device,
         )
         wp.utils.radix_sort_pairs(self._keys, self._order, n)
@@ -115,6 +117,13 @@ class State:
     def blocks(self) -> int:
         """Number of blocks of nodes."""
         return len(self.grid.stamps)
+
+    def pieces(self) -> Iterator[tuple[int, int, int]]:
+        """Slot, first block and number of blocks of each piece that the work on nodes is cut into."""
+        edges = [self.blocks * slot // self.slots for slot in range(self.slots + 1)]
+        for slot, (begin, end) in enumerate(itertools.pairwise(edges)):
+            if end > begin:
+                yield slot, begin, end - begin
 
     def clock_values(self) -> np.void:
         """The clock's fields, by name."""
@@ -198,6 +207,8 @@ def memory_needed(model: Model) -> int:
     particle = records + affine + 4 + 26  # its index; the keys and the scratch of the sort
     musl = model.config.order is Order.MUSL
     node = (8 + 8 + 2 + (2 * 2 if model.damped else 0) + (4 + 8 + 4 if musl else 0)) * NUMBER.itemsize
+    if model.ordered:  # the bins, and the scratch of their sort
+        particle, node = particle + 16, node + 4
     nodes = np.prod(np.array(model.scene.domain.cells, dtype=np.float64) + 3)
     return int(model.scene.particle_count * particle + nodes * node)
 
