@@ -378,7 +378,9 @@ def test_names_that_do_not_suit_files_are_refused(name):
 
 
 def test_walls_are_walls():
-    with pytest.raises(InputError, match=r"^walls: x_low: expected a Wall, got 'open'; Wall\.SLIP, Wall\.STICK or "):
+    with pytest.raises(InputError, match=r"^walls: x_low: expected one of .*, got 'open'; did you mean Wall\.OPEN\?$"):
         Walls.all("open")
-    with pytest.raises(InputError, match=r"^walls: z_high: expected a Wall, got None"):
+    with pytest.raises(
+        InputError, match=r"^walls: z_high: expected one of Wall\.SLIP, Wall\.STICK, Wall\.OPEN, got None$"
+    ):
         Walls(z_high=None)

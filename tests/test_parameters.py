@@ -1,6 +1,7 @@
 """Values from text and from Python, checked against annotations."""
 
 import math
+import re
 from enum import Enum
 from typing import Literal
 
@@ -162,6 +163,31 @@ def test_solver_settings():
     assert (config.shape, config.order, config.cfl) == (ShapeFunction.LINEAR, Order.USL, 0.2)
     assert (config.burn_width, config.viscosity) == (1.5, (1.5, 0.06))
     assert from_text(["burn_width=none"], annotations, "solver") == {"burn_width": None}
+
+
+ALL_SHAPES = "one of ShapeFunction.LINEAR, ShapeFunction.GIMP, ShapeFunction.BSPLINE"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"shape": "gimp"}, f"solver: shape: expected {ALL_SHAPES}, got 'gimp'; did you mean ShapeFunction.GIMP?"),
+        (
+            {"shape": "B-splin"},
+            f"solver: shape: expected {ALL_SHAPES}, got 'B-splin'; did you mean ShapeFunction.BSPLINE?",
+        ),
+        ({"shape": "cubic"}, f"solver: shape: expected {ALL_SHAPES}, got 'cubic'"),
+        ({"shape": Order.USL}, f"solver: shape: expected {ALL_SHAPES}, got <Order.USL: 'usl'>"),
+        (
+            {"transfer": "damped flip"},
+            "solver: transfer: expected one of Transfer.DAMPED_FLIP, Transfer.FLIP, Transfer.APIC, got 'damped flip'; "
+            "did you mean Transfer.DAMPED_FLIP?",
+        ),
+    ],
+)
+def test_a_text_for_a_choice_in_python_is_told_what_to_write(given, message):
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        SolverConfig(**given)
 
 
 def test_the_last_of_equal_names_counts():

@@ -8,10 +8,10 @@ from scenes_for_tests import CELL, OPEN, block, explosive, inert_gas
 
 from warp_mpm import materials
 from warp_mpm.builder import SceneBuilder
+from warp_mpm.checks import closest_match
 from warp_mpm.detonators import PointDetonator, row
 from warp_mpm.geometry import Box, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
-from warp_mpm.parameters import closest_match
 from warp_mpm.progress import opening
 from warp_mpm.scene import Scene
 

@@ -129,7 +129,7 @@ def test_our_checks_can_fail(scene, tmp_path, spoil, found):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"layout": "clips"}, "save: layout: expected a Layout, such as Layout.CLIPS, got 'clips'"),
+        ({"layout": "clips"}, r"save: layout: expected one of .*, got 'clips'; did you mean Layout\.CLIPS\?$"),
         ({"particles_every": 1.5}, "save: particles_every: expected a whole number of at least 1, got 1.5"),
         ({"isosurface": -1e9}, "save: isosurface: expected a positive number, got -1000000000.0"),
     ],

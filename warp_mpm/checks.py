@@ -1,6 +1,8 @@
 """Checks of single values that a user gives; each error is one line: where, expected, got."""
 
 from collections.abc import Callable, Iterable
+from difflib import get_close_matches
+from enum import Enum
 from numbers import Integral
 from typing import Any, TypeVar
 
@@ -9,6 +11,7 @@ from warp_mpm.kernels.numbers import is_number
 
 Vector = tuple[float, float, float]
 Number = TypeVar("Number", int, float)
+Member = TypeVar("Member", bound=Enum)
 
 LARGEST_COUNT = 2**31 - 1
 LONGEST = 80  # characters of a wrong value that a message shows
@@ -17,6 +20,24 @@ LONGEST = 80  # characters of a wrong value that a message shows
 def mistake(where: str, expected: str, got: object, remedy: str = "") -> InputError:
     """The error to raise when a value is wrong: one line that says where, expected, got, and the remedy if any."""
     return InputError(f"{where}: expected {expected}, got {got}" + (f"; {remedy}" if remedy else ""))
+
+
+def closest_match(name: str, known: Iterable[str], prefix: str = "") -> str:
+    """The remedy for a misspelt name: "did you mean ...?", or nothing when no known name is near.
+
+    Args:
+        name: as it was given.
+        known: the names there are.
+        prefix: what the remedy puts before a known name, and is not compared.
+    """
+    plain = {plain_name(one): one for one in known}
+    matches = get_close_matches(plain_name(name), list(plain), n=1)
+    return f"did you mean {prefix}{plain[matches[0]]}?" if matches else ""
+
+
+def plain_name(name: str) -> str:
+    """A name without what is easily mistaken: capitals, and signs between words."""
+    return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
 def shortened(value: Any) -> str:
@@ -125,6 +146,20 @@ def each(where: str, value: Any, length: int, check: Callable[[str, Any], Number
     if len(parts) != length:
         raise mistake(where, f"one number or {length}", shortened(value))
     return [check(where, part) for part in parts]
+
+
+def member(where: str, value: Any, kind: type[Member]) -> Member:
+    """`value` itself.
+
+    Raises:
+        InputError: it is not a member of an Enum; the message says what to write, of a text the member that it means.
+    """
+    if isinstance(value, kind):
+        return value
+    prefix, known = f"{kind.__name__}.", [one.name for one in kind]
+    expected = f"one of {', '.join(prefix + name for name in known)}"
+    remedy = closest_match(value, known, prefix) if isinstance(value, str) else ""
+    raise mistake(where, expected, shortened(value), remedy)
 
 
 def instance(where: str, value: Any, kind: Any, expected: str, remedy: str = "") -> Any:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from warp_mpm.checks import count, flag, instance, names, positive, shortened
+from warp_mpm.checks import count, flag, member, names, positive, shortened
 from warp_mpm.errors import InputError
 from warp_mpm.kernels.numbers import is_number
 
@@ -60,9 +60,9 @@ class SolverConfig:
         Raises:
             InputError: a value is out of range, or two of them exclude each other.
         """
-        instance("solver: shape", self.shape, ShapeFunction, "a ShapeFunction, such as ShapeFunction.BSPLINE")
-        instance("solver: order", self.order, Order, "an Order, such as Order.MUSL")
-        instance("solver: transfer", self.transfer, Transfer, "a Transfer, such as Transfer.FLIP")
+        member("solver: shape", self.shape, ShapeFunction)
+        member("solver: order", self.order, Order)
+        member("solver: transfer", self.transfer, Transfer)
         flag("solver: reproducible", self.reproducible)
         share_ok = is_number(self.pic_share) and 0.0 <= self.pic_share <= 1.0
         _check("pic_share", share_ok, "a share between 0 and 1", self.pic_share)
@@ -123,7 +123,7 @@ class Save:
             raise InputError(f"save: frames: expected at most {MOST_FRAMES}, got {self.frames}")
         flag("save: figures", self.figures)
         flag("save: usdz", self.usdz)
-        instance("save: layout", self.layout, Layout, "a Layout, such as Layout.CLIPS")
+        member("save: layout", self.layout, Layout)
         count("save: particles_every", self.particles_every)
         if self.isosurface is not None:
             positive("save: isosurface", self.isosurface)

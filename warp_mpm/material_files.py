@@ -28,11 +28,11 @@ from pkgutil import iter_modules
 from typing import Any, Literal
 
 import warp_mpm.kernels.eos
-from warp_mpm.checks import mistake, positive
+from warp_mpm.checks import closest_match, mistake, positive
 from warp_mpm.errors import InputError
 from warp_mpm.kernels.eos import EquationOfState
 from warp_mpm.materials import ATMOSPHERE, Burn, Material, OnMismatch, explosive, inert
-from warp_mpm.parameters import annotations_of, closest_match, from_python
+from warp_mpm.parameters import annotations_of, from_python
 
 if sys.version_info >= (3, 11):
     import tomllib

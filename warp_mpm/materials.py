@@ -108,8 +108,8 @@ def explosive(
         InputError: a value is not positive and finite, or speed or pressure do not match the equation of state.
     """
     _check_kind(name, equation_of_state)
-    checks.instance(f"{name}: on_mismatch", on_mismatch, OnMismatch, "an OnMismatch, such as OnMismatch.KEEP")
-    checks.instance(f"{name}: burn", burn, Burn, "a Burn, such as Burn.COMPRESSION")
+    checks.member(f"{name}: on_mismatch", on_mismatch, OnMismatch)
+    checks.member(f"{name}: burn", burn, Burn)
     _check_positive(name, "density", density, "kg/m3")
     _check_positive(name, "detonation_speed", detonation_speed, "m/s")
     start_quietly()  # the check evaluates device functions, which starts Warp

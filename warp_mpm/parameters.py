@@ -7,13 +7,12 @@ unions of these (`float | Literal["cj"]`). Numbers are plain SI; not-a-number an
 import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from difflib import get_close_matches
 from enum import Enum
 from numbers import Integral
 from types import NoneType, UnionType
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
-from warp_mpm.checks import mistake
+from warp_mpm.checks import closest_match, mistake
 from warp_mpm.kernels.numbers import is_number
 
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
@@ -54,18 +53,6 @@ def from_python(values: Mapping[str, Any], annotations: Mapping[str, Any], where
         InputError: a name is unknown, or a value does not suit its annotation.
     """
     return _converted(values, annotations, where, _PYTHON)
-
-
-def closest_match(name: str, known: Iterable[str]) -> str:
-    """The remedy for a misspelt name: "did you mean ...?", or nothing when no known name is near."""
-    plain = {_plain(one): one for one in known}
-    matches = get_close_matches(_plain(name), list(plain), n=1)
-    return f"did you mean {plain[matches[0]]}?" if matches else ""
-
-
-def _plain(name: str) -> str:
-    """A name without what is easily mistaken: capitals, and signs between words."""
-    return "".join(letter for letter in name.lower() if letter.isalnum())
 
 
 class _UnsuitableError(Exception):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from warp_mpm.checks import instance
+from warp_mpm.checks import member
 from warp_mpm.detonators import Detonator
 from warp_mpm.geometry import Solid
 from warp_mpm.materials import Material
@@ -47,7 +47,7 @@ class Walls:
             InputError: one is not a `Wall`.
         """
         for name, wall in zip(FACE_NAMES, self.faces(), strict=True):
-            instance(f"walls: {name}", wall, Wall, "a Wall", "Wall.SLIP, Wall.STICK or Wall.OPEN")
+            member(f"walls: {name}", wall, Wall)
 
     @classmethod
     def all(cls, wall: Wall) -> "Walls":

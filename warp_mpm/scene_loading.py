@@ -17,9 +17,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import warp_mpm.scenes
-from warp_mpm.checks import mistake
+from warp_mpm.checks import closest_match, mistake
 from warp_mpm.errors import InputError
-from warp_mpm.parameters import annotations_of, closest_match, from_python, from_text
+from warp_mpm.parameters import annotations_of, from_python, from_text
 
 if TYPE_CHECKING:  # listing scenes does without Warp, which a scene imports through its materials
     from warp_mpm.scene import Scene

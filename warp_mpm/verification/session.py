@@ -5,10 +5,9 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from warp_mpm.checks import count, mistake
+from warp_mpm.checks import closest_match, count, mistake
 from warp_mpm.config import Save, SolverConfig
 from warp_mpm.errors import SimulationError
-from warp_mpm.parameters import closest_match
 from warp_mpm.progress import Progress, Silent
 from warp_mpm.simulation import simulate
 from warp_mpm.verification.norms import next_coarser, observed_orders
