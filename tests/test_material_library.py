@@ -7,13 +7,14 @@ import pytest
 from scenes_for_tests import TNT
 
 import warp_mpm as mpm
+from warp_mpm.checks import plain_name
 from warp_mpm.cli import main
 from warp_mpm.exact.chapman_jouguet import pressure_of
 from warp_mpm.exact.reflection import collision_pressure
 from warp_mpm.kernels.burn.compression import CompressionBurn
 from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
 from warp_mpm.kernels.eos import evaluate
-from warp_mpm.material_library import FITS, NAMES
+from warp_mpm.material_library import FITS, NAMES, OTHER_NAMES
 
 # Implied by the published parameters, as computed by others: D [m/s], p_CJ [GPa], each to the digits given.
 IMPLIED = {
@@ -126,6 +127,38 @@ def test_choices_and_unknown_names():
     assert set(mpm.library()) == set(NAMES)
     with pytest.raises(mpm.InputError, match=r"^material: expected one of tnt, .*, got 'tmt'; did you mean tnt\?$"):
         mpm.find_material("tmt")
+    with pytest.raises(mpm.InputError, match=r"^material: expected one of tnt, .*, got 3$"):
+        mpm.find_material(3)
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("TNT", "tnt"),
+        ("Composition B", "composition_b"),
+        ("Comp B", "composition_b"),
+        ("C-4", "c4"),
+        ("Composition C-4", "c4"),
+        ("pbx-9404", "pbx_9404"),
+        ("PBX 9404", "pbx_9404"),
+        ("Ammonium Nitrate", "ammonium_nitrate"),
+        ("Air", "air"),
+    ],
+)
+def test_names_as_people_write_them(written, name):
+    assert mpm.find_material(written) == mpm.find_material(name)
+
+
+@pytest.mark.parametrize("name", ["anfo", "pbx", "nitro", "comp", "PBX 9501", "", "-"])
+def test_part_of_a_name_or_another_one_finds_nothing(name):
+    with pytest.raises(mpm.InputError, match=r"^material: expected one of tnt, "):
+        mpm.find_material(name)
+
+
+def test_no_two_names_are_written_alike():
+    """Without capitals and signs between words each still means one material."""
+    names = [*NAMES, *OTHER_NAMES]
+    assert len({plain_name(name) for name in names}) == len(names)
 
 
 FILE = """

@@ -9,12 +9,11 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
-from warp_mpm.checks import mistake
+from warp_mpm.checks import closest_match, instance, mistake, plain_name
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.kernels.eos.jwl import JWL
 from warp_mpm.kernels.eos.stiffened_gas import StiffenedGas
 from warp_mpm.materials import Material, ammonium_nitrate, explosive, inert
-from warp_mpm.parameters import closest_match
 
 GIGAPASCAL = 1e9  # [Pa]
 
@@ -123,23 +122,27 @@ _EXPLOSIVES: Mapping[str, Callable[..., Material]] = {
 _INERT: Mapping[str, Callable[[], Material]] = {"air": air, "water": water}
 
 NAMES = (*_EXPLOSIVES, *_INERT)
+OTHER_NAMES = {"comp_b": "composition_b", "comp_c4": "c4", "composition_c4": "c4"}  # in common use
+_BY_PLAIN_NAME = {plain_name(name): meant for name, meant in [*zip(NAMES, NAMES, strict=True), *OTHER_NAMES.items()]}
 
 
 def find_material(name: str, **choices: Any) -> Material:
     """A material of the library.
 
     Args:
-        name: one of those that `warp-mpm materials` shows.
+        name: one of those that `warp-mpm materials` shows, whatever its capitals and the signs between its words.
         choices: of an explosive, as `explosive` takes them: on_mismatch, burn, unreacted.
 
     Raises:
         InputError: there is no such material.
     """
-    if name in _EXPLOSIVES:
-        return _EXPLOSIVES[name](**choices)
-    if name in _INERT:
-        return _INERT[name]()
-    raise mistake("material", f"one of {', '.join(NAMES)}", repr(name), closest_match(name, NAMES))
+    expected = f"one of {', '.join(NAMES)}"
+    known = _BY_PLAIN_NAME.get(plain_name(instance("material", name, str, expected)), "")
+    if known in _EXPLOSIVES:
+        return _EXPLOSIVES[known](**choices)
+    if known in _INERT:
+        return _INERT[known]()
+    raise mistake("material", expected, repr(name), closest_match(name, NAMES))
 
 
 def library() -> dict[str, Material]:
