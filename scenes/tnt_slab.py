@@ -1,9 +1,7 @@
 """A slab of TNT lit at a rigid wall: the usual benchmark of MPM detonation codes, with the JWL equation of state."""
 
-from typing import Literal
-
 from warp_mpm.builder import SceneBuilder
-from warp_mpm.checks import positive
+from warp_mpm.checks import mistake, positive
 from warp_mpm.detonators import PlaneDetonator
 from warp_mpm.geometry import Box
 from warp_mpm.material_library import find_material
@@ -16,14 +14,17 @@ PICTURES = 5
 def scene(
     *,
     cell_size: float = 0.25e-3,
-    material: Literal["tnt", "tnt_alternative", "composition_b", "c4", "petn", "pbx_9404", "nitromethane"] = "tnt",
+    material: str = "tnt",
     particles_per_axis: int = 2,
 ) -> Scene:
     """A slab 100 mm thick, one cubic cell across between slip walls, lit all over one face, which is a rigid wall.
 
-    It ends as the front reaches the other face: what is recorded is the front's way to p_CJ, 21 GPa for TNT.
+    It ends as the front reaches the other face: what is recorded is the front's way to p_CJ, 21 GPa for TNT; `material`
+    is an explosive of the library, by its name.
     """
     explosive = find_material(material)
+    if explosive.burn is None:
+        raise mistake("material", "an explosive", repr(material), "'warp-mpm materials' lists them")
     speed = explosive.burn.detonation_speed
     edge = LENGTH / max(1, round(LENGTH / positive("cell_size", cell_size)))
     slab = Box((0.0, 0.0, 0.0), (LENGTH, edge, edge))

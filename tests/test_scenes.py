@@ -150,7 +150,9 @@ def test_tnt_slab():
     assert slab.material.cj.pressure == pytest.approx(21e9, rel=1e-4)
     assert scene.end_time * 6930.0 == pytest.approx(0.1, rel=1e-4)
     assert (scene.front_path.start[0], scene.front_path.end[0]) == (0.0, 0.1)
-    assert load_scene("tnt_slab", cell_size=1e-3, material="c4").charges[0].material.name == "c4"
+    assert load_scene("tnt_slab", cell_size=1e-3, material="C-4").charges[0].material.name == "c4"
+    with pytest.raises(InputError, match=r"scene tnt_slab: material: expected an explosive, got 'water'"):
+        load_scene("tnt_slab", material="water")
 
 
 def test_the_front_of_the_tnt_slab():
