@@ -1,5 +1,6 @@
 """What is odd about a scene, but no mistake: idle detonators, explosives too small for their cells or cut by others."""
 
+import math
 import subprocess
 import sys
 
@@ -12,6 +13,8 @@ from warp_mpm.checks import closest_match
 from warp_mpm.detonators import PointDetonator, row
 from warp_mpm.geometry import Box, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
+from warp_mpm.kernels.eos.mie_gruneisen import MieGruneisen
+from warp_mpm.material_library import find_material
 from warp_mpm.progress import opening
 from warp_mpm.scene import Scene
 
@@ -115,6 +118,39 @@ def test_an_ambient_pressure_in_bar_is_asked_for(pressure, asked):
     warnings = block((6, 6, 6), walls=OPEN, ambient_pressure=pressure).warnings
     expected = f"ambient pressure {pressure:g} Pa: is it in pascals? 1 bar is 1e5 Pa"
     assert warnings == ((expected,) if asked else ())
+
+
+@pytest.mark.parametrize("cells", [10, 40])
+@pytest.mark.parametrize("material", [None, inert_gas()], ids=["explosive", "inert"])
+def test_an_end_time_in_microseconds_is_asked_for(material, cells):
+    """The time in which a wave crosses the block, in seconds and in microseconds: 33 or 133 steps, or millions."""
+    speed = 2800.0 if material is None else math.sqrt(1.4 * 0.4 * 1e5)  # c^2 = gamma (gamma - 1) e
+    crossing = cells * CELL / speed
+    assert block((cells, 1, 1), material=material, end_time=crossing).warnings == ()
+    (warning,) = block((cells, 1, 1), material=material, end_time=1e6 * crossing).warnings
+    asked, meant = f"end time {1e6 * crossing:g} s: is it in seconds? ", f"{1e6 * crossing:g} us are {crossing:g} s; "
+    assert warning.startswith(asked + meant)
+    assert warning.endswith(f"it is {1e6 * cells / 0.3:.0e} times the first time step")
+
+
+def test_no_long_run_that_is_meant_is_asked_about():
+    """A slow fuse of a thousand cells; charges in 10 m of water, 25 ms apart; sound that crosses a vessel 10,000 times;
+    cold gas for hours.
+    """
+    slow = materials.explosive("slow", density=1000.0, detonation_speed=300.0, equation_of_state=IdealGas(2.0))
+    assert block((1000, 1, 1), material=slow, end_time=10.0 * CELL * 1000 / 300.0).warnings == ()
+    builder = SceneBuilder("row")
+    builder.domain((0.0, 0.0, 0.0), (10.0, 0.3, 0.3), cell_size=0.05)
+    holes = [Box((x, 0.0, 0.0), (x + 0.3, 0.3, 0.3)) for x in (1.0, 5.0, 9.0)]
+    for number, hole in enumerate(holes):
+        builder.charge(hole, find_material("tnt", unreacted=MieGruneisen(1630.0, 2390.0, 2.05)), name=f"hole_{number}")
+        builder.detonator(PointDetonator((hole.lower[0], 0.0, 0.0), time=25e-3 * number))
+    builder.charge(Box((0.0, 0.0, 0.0), (10.0, 0.3, 0.3)), find_material("water"))
+    builder.end_time(0.1)
+    assert builder.build().warnings == ()
+    still, cold = inert_gas(), inert_gas(energy=1e-6)
+    assert block((50, 1, 1), material=still, end_time=1e4 * 50 * CELL / 237.0).warnings == ()
+    assert block((50, 1, 1), material=cold, end_time=1e4).warnings == ()
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,18 @@
 """What the user should know about a scene that can be run: each warning says what is odd, and what it leads to."""
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from warp_mpm.charges import charge_warnings
+from warp_mpm.config import SolverConfig
 from warp_mpm.detonators import Detonator, PointDetonator
 from warp_mpm.exact.arrival import straight_arrival
 from warp_mpm.geometry import Solid
+from warp_mpm.kernels.eos import evaluate
 from warp_mpm.lattice import Lattice
+from warp_mpm.materials import Material
 from warp_mpm.scene import Charge, Domain
 
 FEW_CELLS = 5.0  # across an explosive: its waves are as wide
@@ -16,6 +20,12 @@ NOTABLE_LOSS = 0.03  # of an explosive's volume, to charges added before it
 SPANS = 1.0 - 1e-9  # of the domain's length: such a charge goes from wall to wall, and may be one cell thick
 MICROSECOND = 1e-6  # [s]
 LEAST_PASCALS = 1e3  # of an ambient pressure: what is less, and not vacuum, may be in bar
+
+# Of a run; more are a mistake. Who gives microseconds as seconds asks for a million times the steps that were meant,
+# which were more than ten. Nobody means so many: steps are as long as cells and speeds allow, so that a slow fuse, or a
+# row of charges with delays of milliseconds, has fewer than a million, and a vessel of a hundred cells that blows out
+# through a hole of three, some 5000 times as slowly as sound crosses it, two million. Gas that expands needs fewer.
+MOST_STEPS = 1e7
 
 
 def scene_warnings(
@@ -26,7 +36,7 @@ def scene_warnings(
     end_time: float,
     ambient_pressure: float,
 ) -> tuple[str, ...]:
-    """Warnings of materials, odd units, charges that lose room or that cells resolve poorly, idle detonators.
+    """Warnings of materials, odd units, endless runs, charges that lose room or have few cells, idle detonators.
 
     Args:
         charges: as they fill what earlier ones leave free.
@@ -40,6 +50,10 @@ def scene_warnings(
     said = list(dict.fromkeys(said))  # what charges of one material have in common is said once
     if 0.0 < ambient_pressure < LEAST_PASCALS:
         said.append(f"ambient pressure {ambient_pressure:g} Pa: is it in pascals? 1 bar is 1e5 Pa")
+    steps = _steps_at_first(charges, domain) * end_time
+    if steps > MOST_STEPS:
+        meant = f"{end_time:g} us are {end_time * MICROSECOND:g} s"
+        said.append(f"end time {end_time:g} s: is it in seconds? {meant}; it is {steps:.0e} times the first time step")
     said += _lost_room(charges, wanted, domain)
     late = [number for number, one in enumerate(detonators, start=1) if one.time >= end_time]
     spent = [
@@ -76,6 +90,20 @@ def _lost_room(charges: Sequence[Charge], wanted: Sequence[Solid], domain: Domai
                 f"{', '.join(takers)}, added before it; if that is not meant, move it, or add it before them"
             )
     return said
+
+
+def _steps_at_first(charges: Sequence[Charge], domain: Domain) -> float:
+    """Steps per time [1/s] of the solver's defaults, with the speeds that the scene begins with."""
+    fastest = max(_wave_speed(charge.material) + charge.greatest_speed for charge in charges)
+    return fastest / (SolverConfig().cfl * min(domain.spacing))
+
+
+def _wave_speed(material: Material) -> float:
+    """Detonation speed, or sound speed at the start of what does not burn [m/s]."""
+    if material.burn is not None:
+        return material.burn.detonation_speed
+    eos = material.equation_of_state
+    return math.sqrt(max(evaluate(eos, eos.sound_speed_squared, material.density, material.specific_energy), 0.0))
 
 
 def _site_volume(charge: Charge, domain: Domain) -> float:
