@@ -344,6 +344,9 @@ def test_gauges_are_shown_with_their_impulse(scene, tmp_path):
     np.testing.assert_allclose(pressure.lines[0].get_data(), [[0.0, 1.0, 3.0], [0.0, 2.0, 1.0]])
     np.testing.assert_allclose(impulse.lines[0].get_ydata(), [0.0, 1.0, 4.0])  # kPa s
     np.testing.assert_allclose(speed.lines[0].get_ydata(), [0.0, 5.0, 10.0])
+    (tmp_path / "gauges.csv").write_text(GAUGES.replace(",1000.0\n", ",0.0\n"))  # the densities of b
+    pressure, *_ = gauges_figure(left_by(tmp_path, scene)).axes
+    assert [line.get_label() for line in pressure.lines[:2]] == ["a", "b (nothing)"]
 
 
 @pytest.mark.parametrize(("count", "named"), [(10, 10), (40, 21)])

@@ -165,6 +165,7 @@ def test_gauges_that_nothing_came_to_are_named_at_the_end():
     moving = Gauge("carried", middle(0.02), moving=True)
     summary = simulate(with_gauges(scene, *gauges, moving), save=NUMBERS_ONLY, device="cpu").summary
     assert summary["gauges"]["near"]["peak_pressure_pa"] > 0.0
+    assert set(summary["gauges"]["far"].values()) == {None}
     (warning,) = (warning for warning in summary["warnings"] if warning.startswith("gauges:"))
     assert warning.startswith(f"gauges: nothing came to 'far' before {summary['end_time_s'] * 1e6:g} us")
 
@@ -183,7 +184,12 @@ def test_a_plane_wave_passes_the_gauges_at_its_speed(device):
     figures = result.summary["gauges"]
     arrivals = np.array([figures[f"at_{x}"]["arrival_time_s"] for x in places])
     assert np.abs(2800.0 * arrivals - places).max() < CELL
-    assert figures["late"]["arrival_time_s"] is None
+    assert figures["late"] == {
+        "arrival_time_s": None,
+        "peak_pressure_pa": 0.0,
+        "peak_time_s": None,
+        "impulse_pa_s": 0.0,
+    }
     for x in places:
         gauge = result.record.gauges[f"at_{x}"]
         figure = figures[f"at_{x}"]

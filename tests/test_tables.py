@@ -150,6 +150,15 @@ def test_small_pressures_are_in_megapascal():
     assert line_with(text, "near")[2:4] == ["0.100", "GPa"]
 
 
+def test_a_gauge_in_vacuum_saw_nothing():
+    """Unlike one in an explosive without pressure, which the wave did not come to."""
+    vacuum = dict.fromkeys(("arrival_time_s", "peak_pressure_pa", "peak_time_s", "impulse_pa_s"))
+    unlit = vacuum | {"peak_pressure_pa": 0.0, "impulse_pa_s": 0.0}
+    text = printed(SUMMARY | {"gauges": {"far": vacuum, "unlit": unlit}})
+    assert line_with(text, "far") == ["–", "–", "nothing", "–", "–"]
+    assert line_with(text, "unlit") == ["–", "0.000", "GPa", "–", "0.0", "kPa", "s"]
+
+
 @pytest.mark.parametrize("missing", [None, "absent"])
 def test_what_does_not_apply_is_a_dash(missing):
     summary = {key: None for key in SUMMARY} if missing is None else {}

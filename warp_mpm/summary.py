@@ -6,7 +6,7 @@ import numpy as np
 
 from warp_mpm.exact.reflection import collision_pressure
 from warp_mpm.materials import Material
-from warp_mpm.output.frame import LineRecord, StepRecord
+from warp_mpm.output.frame import GaugeRecord, LineRecord, StepRecord
 from warp_mpm.scene import Scene
 
 ARRIVAL_SHARE = 0.05  # of p_CJ: the front has arrived at a point when the field pressure there reaches it
@@ -163,7 +163,8 @@ def gauge_figures(scene: Scene, record: StepRecord, material: Material | None) -
     """By gauge: when the front arrived, the highest pressure and its time, and the impulse, the integral of p dt.
 
     The front has arrived when the pressure reaches 0.05 p_CJ, as along the front path, or in what does not burn half of
-    its rise; None if it never did, or without an explosive.
+    its rise; None if it never did, or without an explosive. A pressure that stayed zero was highest at no time. Of a
+    gauge that saw nothing but vacuum everything is None.
     """
     figures: dict[str, dict[str, float | None]] = {}
     for name, gauge in record.gauges.items():
@@ -171,12 +172,13 @@ def gauge_figures(scene: Scene, record: StepRecord, material: Material | None) -
         threshold = _gauge_threshold(scene, name, gauge.pressure, material)
         arrival = np.nan if threshold is None else float(arrival_times(line, threshold)[0])
         highest = int(np.argmax(gauge.pressure))
+        peak, matter = float(gauge.pressure[highest]), _saw_matter(gauge)
         mean = 0.5 * (gauge.pressure[1:].astype(np.float64) + gauge.pressure[:-1])
         figures[name] = {
             "arrival_time_s": arrival if np.isfinite(arrival) else None,
-            "peak_pressure_pa": float(gauge.pressure[highest]),
-            "peak_time_s": float(gauge.time[highest]),
-            "impulse_pa_s": float(mean @ np.diff(gauge.time)),
+            "peak_pressure_pa": peak if matter else None,
+            "peak_time_s": float(gauge.time[highest]) if peak > 0.0 else None,
+            "impulse_pa_s": float(mean @ np.diff(gauge.time)) if matter else None,
         }
     return figures
 
@@ -184,11 +186,16 @@ def gauge_figures(scene: Scene, record: StepRecord, material: Material | None) -
 def gauge_warnings(scene: Scene, record: StepRecord) -> list[str]:
     """What to warn of fixed gauges that saw no matter: their zeros are those of vacuum."""
     fixed = [gauge.name for gauge in scene.gauges if not gauge.moving]
-    unseen = [name for name in fixed if not record.gauges[name].density.any()]
+    unseen = [name for name in fixed if not _saw_matter(record.gauges[name])]
     if not unseen:
         return []
     names, end = ", ".join(repr(name) for name in unseen), f"{record.time[-1] * 1e6:g} us"
     return [f"gauges: nothing came to {names} before {end}, it was in vacuum; move it towards a charge, or end later"]
+
+
+def _saw_matter(gauge: GaugeRecord) -> bool:
+    """Whether a gauge was ever anywhere else than in vacuum."""
+    return bool(gauge.density.any())
 
 
 def _gauge_threshold(scene: Scene, name: str, pressure: np.ndarray, material: Material | None) -> float | None:

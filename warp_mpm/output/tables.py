@@ -25,6 +25,7 @@ KILOPASCAL = 1e3  # [Pa]
 SMALL = 0.1 * GIGAPASCAL  # lower pressures are shown in MPa [Pa]
 MICROSECOND = 1e-6  # [s]
 DASH = "–"
+NOTHING = f"{DASH} nothing"  # what a gauge in vacuum saw
 
 
 # Columns of a gauge, after its name, in the order of its lanes in the record; the last three of moving ones alone.
@@ -192,11 +193,11 @@ def gauge_table(gauges: Mapping[str, Mapping[str, float | None]]) -> Table:
     for heading in ("arrival", "peak pressure", "at", "impulse"):
         table.add_column(heading, justify="right")
     for name, figures in gauges.items():
-        impulse = figures.get("impulse_pa_s")
+        peak, impulse = figures.get("peak_pressure_pa"), figures.get("impulse_pa_s")
         table.add_row(
             name,
             _time(figures.get("arrival_time_s")),
-            _pressure(figures.get("peak_pressure_pa")),
+            NOTHING if peak is None else _pressure(peak),
             _time(figures.get("peak_time_s")),
             DASH if impulse is None else f"{impulse / KILOPASCAL:.1f} kPa s",
         )

@@ -7,7 +7,7 @@ from warp_mpm.output.figures.content import cj_pressure
 from warp_mpm.output.figures.style import GIGAPASCAL, MICROSECOND, NothingToDrawError, draw_cj_line, new_figure
 from warp_mpm.run_directory import Run
 
-PRESSURE = "_pressure_pa"  # ends the name of a gauge's column
+PRESSURE, DENSITY = "_pressure_pa", "_density_kg_m3"  # end the names of a gauge's columns
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#1b1b1b", "#56b4e9", "#e69f00")  # Okabe and Ito's
 LINES = ("-", "--", "-.", ":")
 KILOPASCAL_SECOND = 1e3  # [Pa s]
@@ -17,7 +17,7 @@ SMALL = 0.1 * GIGAPASCAL  # lower pressures are shown in MPa [Pa]
 
 
 def gauges_figure(run: Run) -> Figure:
-    """Pressure, impulse (the integral of pressure over time) and speed at each gauge.
+    """Pressure, impulse (the integral of pressure over time), speed at each gauge; who saw nothing is marked.
 
     Raises:
         NothingToDrawError: the scene has no gauges.
@@ -35,9 +35,10 @@ def gauges_figure(run: Run) -> Figure:
         impulse = np.append(0.0, np.cumsum(0.5 * (pressure[1:] + pressure[:-1]) * np.diff(time)))
         speed = np.linalg.norm([run.gauges[f"{name}_velocity_{axis}_m_s"] for axis in "xyz"], axis=0)
         color, line = COLORS[number % len(COLORS)], LINES[number // len(COLORS) % len(LINES)]
+        label = name if run.gauges[name + DENSITY].any() else f"{name} (nothing)"  # but vacuum
         curves = (pressure / scale, impulse / KILOPASCAL_SECOND, speed)
         for axes, curve in zip(panels, curves, strict=True):
-            axes.plot(time / MICROSECOND, curve, color=color, linestyle=line, linewidth=1.1, label=name)
+            axes.plot(time / MICROSECOND, curve, color=color, linestyle=line, linewidth=1.1, label=label)
     cj = cj_pressure(run)
     if cj is not None and highest >= CLOSE * cj:  # else the line would leave no room for the curves
         draw_cj_line(panels[0], cj)
