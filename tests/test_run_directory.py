@@ -194,9 +194,17 @@ def contents(directory):
 def test_a_run_of_another_scene_is_left_alone(ended, resume):
     before = contents(ended.output)
     other, save = replace(SCENE, name="cone"), Save(frames=2, figures=False)
-    with pytest.raises(InputError, match=r"^output: .* than 'cone', got .* of 'block'; choose another one with -o, or"):
+    said = r"^output: .* than 'cone', got .* of 'block'; choose another one with -o \(output=\.\.\.\), or remove it$"
+    with pytest.raises(InputError, match=said):
         simulate(other, save=save, output=ended.output, resume=resume)
     assert contents(ended.output) == before
+
+
+def test_a_directory_that_cannot_be_made_is_refused_for_both_ways_of_use(tmp_path):
+    (tmp_path / "file").write_text("")
+    said = r"^output: expected a directory that can be written, got .*; choose another one with -o \(output=\.\.\.\)$"
+    with pytest.raises(InputError, match=said):
+        simulate(SCENE, output=tmp_path / "file" / "run")
 
 
 def test_the_command_refuses_another_scene_in_one_line(tmp_path, capfd):

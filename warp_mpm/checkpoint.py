@@ -121,7 +121,7 @@ class Checkpoints:
                 "resume",
                 f"the scene and the settings that {path.name} was made of",
                 f"others: {', '.join(others)}",
-                "give the same again, or start anew without --resume",
+                "give the same again, or start anew without --resume (resume=True)",
             )
 
 

@@ -18,6 +18,7 @@ MOST_NODES = 2**31 - 1
 MEMORY_SHARE = 0.9  # of the free memory that a run may take
 NOTABLE_CLAMP = 1e-3  # of all energy, from which on its clamping is worth a warning
 SHORTEST_STEP = 1e-5  # of the first time step; shorter ones do not come to an end
+ANOTHER = "choose another one with -o (output=...)"  # what a directory is given with: in Python by name
 
 
 def directory_for(scene: str, path: Path) -> Path:
@@ -29,7 +30,7 @@ def directory_for(scene: str, path: Path) -> Path:
     there = scene_in(path)
     if there is not None and there != scene:
         got = f"{str(path)!r}, which holds a run of {there!r}"
-        remedy = "choose another one with -o, or remove it"
+        remedy = f"{ANOTHER}, or remove it"
         raise mistake("output", f"a directory without a run of another scene than {scene!r}", got, remedy)
     return writable_directory(path)
 
@@ -48,8 +49,7 @@ def writable_directory(path: Path) -> Path:
     except (OSError, ValueError) as error:  # the latter for a name that no file can have
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            f"output: expected a directory that can be written, got {str(path)!r} ({reason}); "
-            "choose another one with -o"
+            f"output: expected a directory that can be written, got {str(path)!r} ({reason}); {ANOTHER}"
         ) from error
     return path
 
