@@ -48,6 +48,16 @@ def test_a_result_is_printed_in_one_line(ended):
     assert repr(ended) == f"Result(output={ended.output!r})"
 
 
+def test_frames_are_printed_in_one_line(ended, tmp_path):
+    """How many, when, and where; a killed run may have left a single one."""
+    last = ended.summary["end_time_s"] * 1e6
+    file = str(ended.output / "block.usdc")
+    assert repr(load(ended.output).frames) == f"<4 frames from 0.000 to {last:.3f} us in {file!r}>"
+    killed_run(tmp_path, 1)
+    file = str(tmp_path / "block.usda")
+    assert repr(load(tmp_path).frames) == f"<1 frame from 0.000 to 0.000 us in {file!r}>"
+
+
 def frame(index: int, scene=SCENE) -> Frame:
     """Made-up values that tell frames and particles apart."""
     count = scene.particle_count

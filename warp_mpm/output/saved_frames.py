@@ -85,6 +85,11 @@ class Frames(Sequence[SavedFrame]):
         self._codes = self._stage.GetAttributeAtPath(f"{WORLD}.blast:time").GetTimeSamples()
         self.times = np.array([self.read(f"{WORLD}.blast:time", index) for index in range(len(self._codes))])  # [s]
 
+    def __repr__(self) -> str:
+        count = f"{len(self)} frame" + ("" if len(self) == 1 else "s")
+        span = f" from {self.times[0] * 1e6:.3f} to {self.times[-1] * 1e6:.3f} us" if len(self) else ""
+        return f"<{count}{span} in {str(self._path)!r}>"
+
     def __len__(self) -> int:
         return len(self._codes)
 
