@@ -66,6 +66,8 @@ def test_an_interrupt_before_the_first_frame_is_just_that(device, monkeypatch, t
     assert not (tmp_path / "summary.json").exists()
 
 
-def test_more_frames_than_steps_are_said(device):
-    summary = mpm.simulate(two_explosives(None, end_time=1e-6), save=mpm.Save(frames=50), device=device).summary
-    assert any("some frames are repeated" in warning for warning in summary["warnings"])
+@pytest.mark.parametrize(("save", "said"), [(mpm.Save(frames=50), True), (mpm.Save(), False), (None, False)])
+def test_more_frames_than_steps_are_said_to_who_asked_for_them(device, save, said):
+    summary = mpm.simulate(two_explosives(None, end_time=1e-6), save=save, device=device).summary
+    assert summary["steps"] < 50
+    assert any("some frames are repeated" in warning for warning in summary["warnings"]) == said

@@ -379,7 +379,8 @@ class _Run:
         return self.history[-1]["particle_volume_m3"] / sum(charge.volume for charge in self.scene.charges) - 1.0
 
     def _frame_warnings(self) -> list[str]:
-        if self.save.frames <= self.steps + 1:
+        asked_for = self.save.frames != Save().frames  # the default is for runs of any length
+        if not asked_for or self.save.frames <= self.steps + 1:
             return []
         return [f"frames: {self.save.frames} asked for, but only {self.steps} steps taken: some frames are repeated"]
 
