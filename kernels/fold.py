@@ -125,7 +125,7 @@ def fold_kernel(momentum: bool, force: bool) -> wp.Kernel:
         if wp.static(force):
             grid.field[n] = field
 
-    return node_kernel(fold, None, 0)
+    return node_kernel(fold, None, None, 0)
 
 
 @functools.cache
@@ -164,4 +164,4 @@ def fold_reprojected_kernel() -> wp.Kernel:
                         )
         grid.reprojected[n] = vector4(momentum[0], momentum[1], momentum[2], total[3])
 
-    return node_kernel(fold, None, 1)
+    return node_kernel(fold, None, None, 1)

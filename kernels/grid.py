@@ -9,7 +9,7 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.content import inside, solve_cell, stands_for_itself
-from warp_mpm.kernels.neighbours import acceleration_excess_function
+from warp_mpm.kernels.inside import solve_inside_function
 from warp_mpm.kernels.node_pass import (
     Phase,
     inverse_mass,
@@ -59,8 +59,9 @@ def occupied_volume(grid: Grid, index: wp.vec3i, filling: scalar) -> scalar:
 
 @wp.func
 def look_ahead(grid: Grid, n: int):
-    """Ask for a row of what is solved."""
+    """Ask for a row of what is solved, and for the one above it along x, which may lie in a block not yet visited."""
     prefetch_eight(grid.sums, n)
+    prefetch_eight(grid.sums, n + grid.stride_x)
     prefetch_eight(grid.start, n)
     prefetch_four(grid.reprojected, n)
     prefetch_two(grid.field, n)
@@ -78,7 +79,8 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
     least half filled inside the domain goes to `peaks`.
     """
     excess = excess_function(acceleration_of, scattered_mass)
-    excess_inside = acceleration_excess_function()
+    solve_row = solve_inside_function(force, cells, sharpened, reprojects)
+    solve_one = solve_inside_function(force, cells, sharpened, reprojects, plain=True)
 
     @wp.func
     def field_at(grid: Grid, phase: Phase, slot: int, index: wp.vec3i, sums: vector8, inverse: scalar) -> vector2:
@@ -130,38 +132,12 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
             grid.reprojected[node_index(grid, index[0], index[1], index[2])] = vector4()
 
     @wp.func
-    def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
-        sums = grid.sums[n]
-        mass = sums[3]
-        per_volume = grid.inverse_spacing[0] * grid.inverse_spacing[1] * grid.inverse_spacing[2]
-        if wp.static(cells):  # narrow shapes reach cells without the node of their index
-            grid.content[n] = per_volume * grid.content_sums[n]
-            grid.content_sums[n] = vector2()
-        if mass == ZERO:
-            grid.start[n] = vector8()
-            if sums[4] != ZERO or sums[5] != ZERO or sums[6] != ZERO:
-                grid.sums[n] = vector8()  # linear shapes push at nodes where they have no weight
-            return
-        inverse = inverse_mass(grid, mass)
-        v = inverse * first_three(sums)
-        a = vector3()
-        if wp.static(force):
-            pushed = second_three(sums)
-            if wp.static(sharpened):
-                pulled = excess_inside(grid.sums, n, grid.stride_x, grid.stride_y, grid.light_mass)
-                pushed += phase.strength * first_three(pulled)
-            if inverse > ZERO:
-                a = inverse * pushed + boundary.gravity
-            filling = per_volume * sums[7]
-            share = inside(filling)
-            field = grid.field[n]
-            pressure = inverse * mass * per_volume * field[0] / (share * filling + ONE - share)
-            grid.field[n] = vector2(pressure, wp.sqrt(inverse * field[1]))
-            if filling >= HALF:
-                raise_maximum(phase.peaks, slot, pressure)
-        grid.start[n] = vector8(v[0], v[1], v[2], mass, a[0], a[1], a[2], inverse)
-        if wp.static(reprojects):
-            grid.reprojected[n] = vector4()
+    def visit_row(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+        raise_maximum(phase.peaks, slot, solve_row(grid, boundary.gravity, phase.strength, n))
+
+    @wp.func
+    def visit_one(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+        raise_maximum(phase.peaks, slot, solve_one(grid, boundary.gravity, phase.strength, n))
 
     @wp.func
     def forget(grid: Grid, n: int):
@@ -173,7 +149,7 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
         if wp.static(reprojects):
             grid.reprojected[n] = vector4()
 
-    return node_kernel(visit, visit_inside, 0, look_ahead, forget)
+    return node_kernel(visit, visit_row, visit_one, 0, look_ahead, forget)
 
 
 @wp.func

@@ -1,7 +1,7 @@
 """A pass over the nodes of all active blocks: the loop that every grid phase shares.
 
-A phase is two device functions: `visit` works on any node, with what walls and faces ask for; `visit_inside` on a node
-of a block that lies wholly inside, two nodes or more from every face, where nothing is special.
+A phase works on any node, with what walls and faces ask for; and, faster, on nodes two or more from every face, where
+nothing is special: on a CPU a row of four at a time, where all four are such nodes.
 """
 
 import functools
@@ -9,6 +9,7 @@ import functools
 import warp as wp
 
 from warp_mpm.kernels.blocks import EDGE, NODES, is_active, lowest_node_of, node_of_block, on_grid
+from warp_mpm.kernels.node_rows import nodes_at_a_time
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 from warp_mpm.kernels.records import Clock, Grid, node_index
 from warp_mpm.kernels.stencil import prefetch_row_function
@@ -52,6 +53,13 @@ def has_no_face_near(grid: Grid, index: wp.vec3i) -> bool:
 
 
 @wp.func
+def row_has_no_face_near(grid: Grid, index: wp.vec3i, place: int, row: int) -> bool:
+    """The same of all nodes of a row, given one of them and its place there."""
+    begin = wp.vec3i(index[0], index[1], index[2] - place)
+    return has_no_face_near(grid, begin) and has_no_face_near(grid, begin + wp.vec3i(0, 0, row - 1))
+
+
+@wp.func
 def inverse_mass(grid: Grid, mass: scalar) -> scalar:
     """1 / mass [1/kg], or 0 of a node that counts as empty."""
     counts = mass > grid.light_mass
@@ -68,44 +76,50 @@ def damped_share(now: Clock, sound_speed: scalar) -> scalar:
 @functools.cache
 def node_kernel(
     visit: wp.Function,
-    visit_inside: wp.Function | None,
+    visit_row: wp.Function | None,
+    visit_one: wp.Function | None,
     age: int,
     look_ahead: wp.Function | None = None,
     retire: wp.Function | None = None,
 ) -> wp.Kernel:
     """Kernel over the blocks that were scattered to `age` steps ago, from `begin` on.
 
-    visit(grid, boundary, now, phase, slot, index) and visit_inside(grid, boundary, now, phase, slot, n), with the
-    clock's values `now`, a node's `index` (i, j, k) and its flat index n. Without `visit_inside` there is nothing to do
-    for nodes that have no face near. `look_ahead(grid, n)` asks for a row of the next block, n its first node: thin gas
-    keeps a pass waiting for memory, and row by row a CPU does both, waits and works; a whole block's rows asked for at
-    once are too many for it. `retire(grid, n)` is for nodes of blocks that were last scattered to a step before that.
+    visit(grid, boundary, now, phase, slot, index) for any node, with the clock's values `now` and the node's `index`
+    (i, j, k); visit_row and visit_one(grid, boundary, now, phase, slot, n) for rows (see `node_rows.py`) and nodes that
+    have no face near, n the flat index of the first; without them there is nothing to do for these. `look_ahead(grid,
+    n)` asks for a row of the next block, n its first node: thin gas keeps a pass waiting for memory, and row by row a
+    CPU does both, waits and works; a whole block's rows asked for at once are too many for it. `retire(grid, n)` is for
+    nodes of blocks that were last scattered to a step before that.
     """
-    goes_inside, looks_ahead, retires = visit_inside is not None, look_ahead is not None, retire is not None
+    goes_inside, looks_ahead, retires = visit_row is not None, look_ahead is not None, retire is not None
 
     @wp.kernel(enable_backward=False, module="unique")
     def over_nodes(grid: Grid, boundary: Boundary, clock: wp.array(dtype=Clock), phase: Phase, slot: int, begin: int):
         thread = wp.tid()
         block = begin + thread // grid.workers
         now = clock[0]
+        row = nodes_at_a_time()
         if is_active(grid, block, now.step - wp.static(age)):
             lowest = lowest_node_of(grid, block)
             if lies_inside(grid, lowest):
                 if wp.static(goes_inside):
-                    first = node_index(grid, lowest[0], lowest[1], lowest[2])
-                    for n in range(thread % grid.workers, NODES, grid.workers):
-                        node = first + (n >> 4) * grid.stride_x + ((n >> 2) & 3) * grid.stride_y + (n & 3)
+                    corner = node_index(grid, lowest[0], lowest[1], lowest[2])
+                    for n in range(thread % grid.workers * row, NODES, grid.workers * row):
+                        node = corner + (n >> 4) * grid.stride_x + ((n >> 2) & 3) * grid.stride_y + (n & 3)
                         if wp.static(looks_ahead):
-                            if (n & (EDGE - 1)) == 0:
-                                look_ahead(grid, node + EDGE)
-                        visit_inside(grid, boundary, now, phase, slot, node)
+                            look_ahead(grid, node + EDGE)
+                        visit_row(grid, boundary, now, phase, slot, node)
             else:
                 for n in range(thread % grid.workers, NODES, grid.workers):
                     index = node_of_block(lowest, n)
-                    if has_no_face_near(grid, index):
+                    node = node_index(grid, index[0], index[1], index[2])
+                    if row_has_no_face_near(grid, index, n % row, row):
                         if wp.static(goes_inside):
-                            node = node_index(grid, index[0], index[1], index[2])
-                            visit_inside(grid, boundary, now, phase, slot, node)
+                            if n % row == 0:
+                                visit_row(grid, boundary, now, phase, slot, node)
+                    elif has_no_face_near(grid, index):
+                        if wp.static(goes_inside):
+                            visit_one(grid, boundary, now, phase, slot, node)
                     elif on_grid(grid, index):
                         visit(grid, boundary, now, phase, slot, index)
         if wp.static(retires):

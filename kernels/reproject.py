@@ -7,12 +7,13 @@ import functools
 
 import warp as wp
 
-from warp_mpm.kernels.neighbours import velocity_excess_function
+from warp_mpm.kernels.inside import solve_reprojected_inside_function
 from warp_mpm.kernels.node_pass import Phase, damped_share, node_kernel, prefetch_eight, prefetch_four, prefetch_two
+from warp_mpm.kernels.node_rows import nodes_at_a_time
 from warp_mpm.kernels.precision import HALF, ONE, TWO, ZERO, scalar, vector2, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, node_index
 from warp_mpm.kernels.sharpen import excess_function, mass_at_start, twice, velocities_of
-from warp_mpm.kernels.vectors import first_three, multiply_add8, second_three
+from warp_mpm.kernels.vectors import first_three, second_three
 from warp_mpm.kernels.walls import (
     Boundary,
     free_components,
@@ -34,9 +35,11 @@ def empty(grid: Grid, n: int):
 
 @wp.func
 def look_ahead(grid: Grid, n: int):
-    """Ask for a row of what is solved."""
+    """Ask for a row of what is solved, and for the one above it along x, which may lie in a block not yet visited."""
     prefetch_eight(grid.start, n)
     prefetch_four(grid.reprojected, n)
+    prefetch_eight(grid.start, n + grid.stride_x)
+    prefetch_four(grid.reprojected, n + grid.stride_x)
     prefetch_two(grid.field, n)
     prefetch_eight(grid.end, n)
     prefetch_four(grid.damping, n)
@@ -50,14 +53,21 @@ def clear_node(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: i
 
 
 @wp.func
-def clear_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+def clear_one(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
     """Empty a node."""
     empty(grid, n)
 
 
+@wp.func
+def clear_row(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+    """Empty a row of nodes."""
+    for k in range(nodes_at_a_time()):
+        empty(grid, n + k)
+
+
 def clear_kernel() -> wp.Kernel:
     """Empty the sums of the last scatter, one step ago: where nothing is re-projected, which does that besides."""
-    return node_kernel(clear_node, clear_inside, 1)
+    return node_kernel(clear_node, clear_row, clear_one, 1)
 
 
 @functools.cache
@@ -68,7 +78,8 @@ def solve_reprojected_kernel(sharpened: bool, damped: bool) -> wp.Kernel:
     (v^n + v_r) / 2, which does the work.
     """
     excess = excess_function(velocities_of, mass_at_start)
-    excess_inside = velocity_excess_function()
+    solve_row = solve_reprojected_inside_function(sharpened, damped)
+    solve_one = solve_reprojected_inside_function(sharpened, damped, plain=True)
 
     @wp.func
     def damping_of(start: vector8, total: vector4, alpha: scalar) -> vector4:
@@ -109,20 +120,11 @@ def solve_reprojected_kernel(sharpened: bool, damped: bool) -> wp.Kernel:
         empty(grid, n)
 
     @wp.func
-    def visit_inside(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
-        start = grid.start[n]
-        if start[3] == ZERO:
-            grid.end[n] = vector8()
-            grid.damping[n] = vector4()
-            return
-        total = grid.reprojected[n]
-        alpha = damped_share(now, grid.field[n][1])
-        values = both_velocities(start, total, now.dt, alpha)
-        if wp.static(sharpened):
-            pulled = excess_inside(grid.start, grid.reprojected, n, grid.stride_x, grid.stride_y, now.dt)
-            values = multiply_add8(values, phase.strength * start[7], pulled)
-        grid.end[n] = values
-        grid.damping[n] = damping_of(start, total, alpha)
-        empty(grid, n)
+    def visit_row(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+        solve_row(grid, now.dt, now.damping, phase.strength, n)
 
-    return node_kernel(visit, visit_inside, 1, look_ahead)
+    @wp.func
+    def visit_one(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
+        solve_one(grid, now.dt, now.damping, phase.strength, n)
+
+    return node_kernel(visit, visit_row, visit_one, 1, look_ahead)

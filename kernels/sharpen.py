@@ -15,7 +15,7 @@ end: Nairn and Hammerquist 2021, Material point method simulations using an appr
 A node on a wall stands for its mirror image too: seen along the wall's normal it has twice its mass.
 
 The sums over neighbours are taken where nodes are solved (`grid.py`, `reproject.py`): here for any node, with walls, by
-its index; in `neighbours.py` for those that have no face near.
+its index; in `inside.py` for those that have no face near.
 """
 
 import functools
