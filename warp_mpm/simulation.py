@@ -33,6 +33,7 @@ from warp_mpm.solver import Solver
 from warp_mpm.state import State
 from warp_mpm.stopping import StopRequest
 from warp_mpm.summary import figures_of_merit, gauge_warnings
+from warp_mpm.turns import taking_turns
 from warp_mpm.version import VERSION
 
 GROWTH = 1.1  # of the time step, at most; as in kernels.reduce
@@ -52,6 +53,7 @@ class Result:
     output: Path | None  # the run directory
 
 
+@taking_turns
 def simulate(
     scene: Scene,
     *,
@@ -66,7 +68,8 @@ def simulate(
     """Simulate a scene to its end time.
 
     Asked to stop by SIGINT (Ctrl-C) or SIGTERM, it ends the step, saves what there is with a checkpoint, and raises
-    KeyboardInterrupt or `Terminated`; asked twice, it stops at once.
+    KeyboardInterrupt or `Terminated`; asked twice, it stops at once. Called in a thread while another runs one, it
+    waits: one run uses all cores, and several at a time want a process each.
 
     Args:
         scene: what is simulated.

@@ -2,15 +2,23 @@
 
 import functools
 import os
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import warp as wp
 
+_starting = threading.Lock()  # two threads that swap standard error at a time would leave it dropped
 
-@functools.cache
+
 def start_quietly() -> None:
     """Initialize Warp. What it prints on the way is dropped; its later warnings are not."""
+    with _starting:
+        _start()
+
+
+@functools.cache
+def _start() -> None:
     wp.config.log_level = wp.LOG_WARNING
     with _standard_error_dropped():
         wp.init()
