@@ -6,6 +6,7 @@ import pytest
 from scenes_for_tests import TNT, block, inert_gas
 
 import warp_mpm as mpm
+from warp_mpm.progress import Silent
 
 # What is good for each argument of every public class and function that takes numbers; those with a default too.
 POINT, VECTOR = (0.01, 0.02, 0.03), (0.0, 1.0, 0.0)
@@ -34,7 +35,7 @@ def lit_by(kind):
 
 def simulated(**arguments):
     """A run of a gas that is over soon."""
-    mpm.simulate(block((2, 2, 2), material=inert_gas(), end_time=1e-7), **arguments)
+    return mpm.simulate(block((2, 2, 2), material=inert_gas(), end_time=1e-7), **arguments)
 
 
 CALLS = {
@@ -114,7 +115,14 @@ CALLS = {
     "SceneBuilder": (mpm.SceneBuilder, {"name": "bad"}),
     "simulate": (
         simulated,
-        {"config": mpm.SolverConfig(), "save": mpm.Save(), "device": "cpu", "threads": 1, "resume": False},
+        {
+            "config": mpm.SolverConfig(),
+            "save": mpm.Save(),
+            "device": "cpu",
+            "threads": 1,
+            "progress": Silent(),
+            "resume": False,
+        },
     ),
     "domain of cell_size": (
         builder_call("domain"),
@@ -188,3 +196,20 @@ def test_what_is_no_value_is_refused(title, name):
         except Exception as error:
             taken.append(f"{bad!r:.80} raised {type(error).__name__}")
     assert not taken
+
+
+READERS = (mpm.load, mpm.load_scene, mpm.load_materials, mpm.load_mesh)
+
+
+@pytest.mark.parametrize("call", [*READERS, lambda path: simulated(output=path)])
+def test_what_is_no_path_is_refused(call):
+    for bad in (3, b"x", math.nan, (), object(), True):
+        with pytest.raises(mpm.InputError, match="expected a path, got "):
+            call(bad)
+
+
+def test_what_is_no_summary_is_refused():
+    """A result has one, and is none."""
+    for bad in (None, "x", simulated()):
+        with pytest.raises(mpm.InputError, match=r"expected a summary, .*\.summary$"):
+            mpm.print_summary(bad)

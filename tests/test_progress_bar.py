@@ -57,6 +57,18 @@ def test_closing_before_the_first_update_and_twice(terminal):
     progress.close()
 
 
+@pytest.mark.parametrize("terminal", [True, False])
+def test_one_run_after_the_other(terminal):
+    """The second one of a study shows as much as the first, with a time left of its own."""
+    console = Console(file=io.StringIO(), width=100, force_terminal=terminal)
+    progress = progress_on(console)
+    for _ in range(2):
+        run_with(progress)
+    assert console.file.getvalue().count("100.0 of 100.0 us  step 1000") == 2
+    lines = [line for line in console.file.getvalue().splitlines() if "step 0 " in line]
+    assert terminal or not any("left" in line for line in lines)
+
+
 def test_a_long_run_is_not_silent(monkeypatch):
     """No time left is told from the first step alone; later a line every half minute, however far away the end is."""
     console, now = Console(file=io.StringIO(), width=60), [0.0]

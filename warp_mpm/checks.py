@@ -1,9 +1,11 @@
 """Checks of single values that a user gives; each error is one line: where, expected, got."""
 
+import os
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from enum import Enum
 from numbers import Integral
+from pathlib import Path
 from typing import Any, TypeVar
 
 from warp_mpm.errors import InputError
@@ -103,6 +105,15 @@ def flag(where: str, value: Any) -> bool:
         InputError: it is neither True nor False.
     """
     return bool(instance(where, value, bool, "True or False"))
+
+
+def as_path(where: str, value: Any) -> Path:
+    """`value` as a path.
+
+    Raises:
+        InputError: it is neither a text nor a path.
+    """
+    return Path(instance(where, value, (str, os.PathLike), "a path"))
 
 
 def names(where: str, value: Any) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from pkgutil import iter_modules
 from typing import Any, Literal
 
 import warp_mpm.kernels.eos
-from warp_mpm.checks import closest_match, mistake, positive
+from warp_mpm.checks import as_path, closest_match, mistake, positive
 from warp_mpm.errors import InputError
 from warp_mpm.kernels.eos import EquationOfState
 from warp_mpm.materials import ATMOSPHERE, Burn, Material, OnMismatch, explosive, inert
@@ -72,7 +72,7 @@ def load_materials(path: str | Path) -> dict[str, Material]:
         InputError: there is no such file, it is not TOML, or a table is not a material; one line that names file, table
             and key.
     """
-    file = Path(path)
+    file = as_path("materials", path)
     try:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 import meshio
 import numpy as np
 
-from warp_mpm.checks import mistake, positive
+from warp_mpm.checks import as_path, mistake, positive
 from warp_mpm.geometry import Mesh
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}  # [m]
@@ -40,7 +40,7 @@ def load_mesh(path: str | Path, *, unit: str | float = "m") -> Mesh:
         InputError: there is no such file, it cannot be read, or what is in it is not one closed surface whose faces
             look outwards (see `Mesh`).
     """
-    where = f"mesh {str(path)!r}"
+    where = f"mesh {str(as_path('mesh', path))!r}"
     length = _length(where, unit)
     points, cells = _read(where, path)
     with np.errstate(over="ignore"):  # what becomes infinite is refused

@@ -1,14 +1,18 @@
 """What a long run tells the person who waits for it."""
 
 import math
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from warp_mpm.kernels.precision import PRECISION
 from warp_mpm.scene import Scene
 
 
+@runtime_checkable
 class Progress(Protocol):
-    """Receives the state of a run; `simulate` calls it often, the receiver decides how often to draw."""
+    """Receives the state of a run; `simulate` calls it often, the receiver decides how often to draw.
+
+    It may be given to one run after the other.
+    """
 
     def message(self, text: str) -> None:
         """Say one line, for example what is being prepared."""

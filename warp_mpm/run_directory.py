@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warp_mpm.checks import mistake
+from warp_mpm.checks import as_path, mistake
 from warp_mpm.output.description import SceneDescription, description_from_json
 from warp_mpm.output.frame import SectionPicture, StepRecord
 from warp_mpm.output.steps import read_steps
@@ -39,7 +39,7 @@ def load(path: str | Path) -> "Run":
     Raises:
         InputError: there is no such file, or it is neither; when something is used, that it is damaged.
     """
-    path = Path(path)
+    path = as_path("load", path)
     if path.is_file() and path.suffix in USD_SUFFIXES:
         return Run(None, path)
     if not path.is_dir():

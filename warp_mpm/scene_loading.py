@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import warp_mpm.scenes
-from warp_mpm.checks import closest_match, mistake
+from warp_mpm.checks import as_path, closest_match, mistake
 from warp_mpm.errors import InputError
 from warp_mpm.parameters import annotations_of, from_python, from_text
 
@@ -77,7 +77,7 @@ def find_scene(scene: str | Path) -> SceneFile:
     Raises:
         InputError: there is none; the message lists the known ones.
     """
-    path = Path(scene)
+    path = as_path("scene", scene)
     if path.is_file():
         return SceneFile(path)
     known = {file.name: file for file in list_scenes()}

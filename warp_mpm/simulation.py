@@ -87,7 +87,7 @@ def simulate(
         SimulationError: the run cannot go on.
     """
     config, save = SolverConfig() if config is None else config, Save() if save is None else save
-    run = _Run(scene, config, save, output, device, threads, progress or Silent(), resume)
+    run = _Run(scene, config, save, output, device, threads, Silent() if progress is None else progress, resume)
     try:
         run.to_the_end()
     except (KeyboardInterrupt, Terminated):
@@ -125,10 +125,12 @@ class _Run:
         self.save = checks.instance("simulate: save", save, Save, "a Save")
         checks.instance("simulate: config", config, SolverConfig, "a SolverConfig")
         checks.flag("simulate: resume", resume)
-        self.progress = progress
+        self.progress = checks.instance(
+            "simulate: progress", progress, Progress, "a Progress", "progress_on() makes one"
+        )
         self.begin = time.perf_counter()  # [s]; of a resumed run, as if it had gone on all the time
         self.launcher = Launcher(find_device(device), threads)
-        self.output = None if output is None else directory_for(scene.name, Path(output))
+        self.output = None if output is None else directory_for(scene.name, checks.as_path("simulate: output", output))
         self.model = build_model(scene, config, self.launcher.device)
         check_memory(self.model)
         self.checkpoints = Checkpoints(self.output, self._identity(config), save)

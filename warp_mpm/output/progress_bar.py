@@ -24,13 +24,7 @@ class ProgressBar:
     def __init__(self, console: Console) -> None:
         """A bar on `console`; it appears with the first update."""
         self._console = console
-        self._bar = Progress(
-            BarColumn(),
-            TaskProgressColumn(),
-            TextColumn("{task.description}", markup=False),
-            TimeRemainingColumn(compact=True, elapsed_when_finished=True),
-            console=console,
-        )
+        self._bar = self._new_bar()
 
     def message(self, text: str) -> None:
         """Print a line above the bar."""
@@ -44,8 +38,18 @@ class ProgressBar:
         self._bar.update(self._bar.task_ids[0], completed=time, description=_state(time, end_time, step, note))
 
     def close(self) -> None:
-        """Leave the bar as it is."""
+        """Leave the bar as it is; another run gets another one."""
         self._bar.stop()
+        self._bar = self._new_bar()
+
+    def _new_bar(self) -> Progress:
+        return Progress(
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.description}", markup=False),
+            TimeRemainingColumn(compact=True, elapsed_when_finished=True),
+            console=self._console,
+        )
 
 
 class ProgressLines:
@@ -78,7 +82,8 @@ class ProgressLines:
         self.message(f"{share:4.0%}  {_state(time, end_time, step, note)}{left}")
 
     def close(self) -> None:
-        """Nothing to close."""
+        """Another run begins anew."""
+        self._printed = -1
 
 
 def _state(time: float, end_time: float, step: int, note: str) -> str:

@@ -16,6 +16,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from warp_mpm.checks import instance
 from warp_mpm.output.whole_file import whole_file, write_error
 from warp_mpm.scene import Gauge
 
@@ -147,7 +148,11 @@ def print_summary(summary: Mapping[str, Any], console: Console | None = None) ->
     Args:
         summary: as in summary.json; what is missing or null shows as a dash.
         console: where to; standard output if not given.
+
+    Raises:
+        InputError: it is none.
     """
+    instance("print_summary: summary", summary, Mapping, "a summary", "a Result and a Run have one: .summary")
     console = console or Console()
     console.print(theory_table(summary))
     if summary.get("gauges"):
