@@ -90,6 +90,7 @@ def test_a_usd_file(run):
     assert line_with(text, "/World/particles") == f"/World/particles  Points  {SCENE.particle_count:,} points"
     assert line_with(text, "particleVelocity").endswith("vertex, 3 samples, 5 to 5 m/s")
     assert "float[]   vertex, 3 samples, 0 to 3e+09 Pa" in text
+    assert line_with(text, "charge ").endswith("int[]     vertex, 0 samples, 0 to 0")
     assert line_with(text, "microsecondsPerTimeCode") == "microsecondsPerTimeCode: 15.0"
     assert line_with(text, "/World/detonators/detonator_0").endswith("at (0, 0.02, 0.01) m, lit at 2 µs")
 

@@ -7,11 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scenes_for_tests import OPEN, block
+from scenes_for_tests import OPEN, block, inert_gas
 
 from warp_mpm import InputError, Save, load, simulate
+from warp_mpm.builder import SceneBuilder
 from warp_mpm.cli import main
 from warp_mpm.detonators import PlaneDetonator, PointDetonator
+from warp_mpm.geometry import Box
 from warp_mpm.output import figures
 from warp_mpm.output.description import description_from_json, scene_values
 from warp_mpm.output.figures import film
@@ -56,6 +58,27 @@ def test_frames_are_printed_in_one_line(ended, tmp_path):
     killed_run(tmp_path, 1)
     file = str(tmp_path / "block.usda")
     assert repr(load(tmp_path).frames) == f"<1 frame from 0.000 to 0.000 us in {file!r}>"
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_frames_say_of_which_charge_each_particle_is(tmp_path, every):
+    """A flyer, a plate that it flies to, and one that it does not: each particle by where it is at the start."""
+    builder = SceneBuilder("plates")
+    builder.domain((0.0, 0.0, 0.0), (0.06, 0.02, 0.02), cell_size=1e-2)
+    for name, low in (("flyer", 0.0), ("base", 0.04), ("other", 0.02)):
+        builder.charge(Box((low, 0.0, 0.0), (low + 0.01, 0.02, 0.02)), inert_gas(), name=name)
+    builder.end_time(1e-6)
+    simulate(builder.build(), save=Save(frames=2, figures=False, particles_every=every), output=tmp_path)
+    run = load(tmp_path)
+    names = [charge["name"] for charge in run.summary["charges"]]
+    assert names == ["flyer", "base", "other"]
+    for saved in run.frames:
+        of_charge = saved.fields["charge"]
+        assert of_charge.shape == saved.pressure.shape == (-(-96 // every),)
+        for name, low in (("flyer", 0.0), ("base", 0.04), ("other", 0.02)):
+            x = saved.position[of_charge == names.index(name), 0]
+            assert len(x) in (32 // every, 32 // every + 1)
+            assert low < x.min() < x.max() < low + 0.01
 
 
 def frame(index: int, scene=SCENE) -> Frame:

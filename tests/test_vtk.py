@@ -77,7 +77,7 @@ def test_what_is_read_back_is_what_was_saved(scene, run, tmp_path, read):
         assert kind == "vertex"
         np.testing.assert_array_equal(corners.ravel(), np.arange(len(points)))
         np.testing.assert_array_equal(points, saved.position[saved.inside])
-        assert set(data) == {"pressure", "id", *FIELDS}
+        assert set(data) == {"pressure", "id", "charge", *FIELDS}
         np.testing.assert_array_equal(data["id"], np.flatnonzero(saved.inside))
         np.testing.assert_array_equal(data["pressure"], saved.pressure[saved.inside])
         for name in FIELDS:

@@ -156,7 +156,7 @@ def _range(attribute: Any, codes: list[Any]) -> tuple[float, float]:
         values = np.asarray(attribute.Get(code))
         if not np.issubdtype(values.dtype, np.number):
             continue
-        values = np.linalg.norm(values, axis=1) if values.ndim == 2 else values
+        values = np.linalg.norm(values, axis=1) if values.ndim == 2 else values.astype(np.float64)
         finite = values[np.isfinite(values)]
         lower = float(finite.min(initial=lower))
         upper = float(finite.max(initial=upper))

@@ -63,7 +63,10 @@ class SavedFrame:
 
     @cached_property
     def fields(self) -> dict[str, np.ndarray]:
-        """Further particle fields that were saved, by name: (n,) or (n, 3) float32, SI units."""
+        """Further particle fields, by name: those that were saved, (n,) or (n, 3) float32, SI units, and `charge`.
+
+        That is the number of the particle's charge in `Run.summary["charges"]`, (n,) int32.
+        """
         return {name: self._frames.read(f"{PARTICLES}.primvars:{name}", self.index) for name in self._frames.fields}
 
 

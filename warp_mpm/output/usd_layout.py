@@ -1,7 +1,7 @@
 """What the USD file is made of: its prims, its metadata, and everything in it that does not change in time.
 
     /World                  Xform, kind component; time-sampled blast:time [s]
-    /World/particles        Points: points, extent, widths, ids, primvars pressure, displayColor and further fields
+    /World/particles        Points: points, extent, widths, ids, primvars pressure, displayColor, charge, further fields
     /World/section          Mesh: the field pressure on the scene's section plane
     /World/isosurface       Mesh, if asked for: where the field pressure has a given value; time-sampled topology
     /World/detonators       one prim each, with position and ignition time: spheres for points, curves for all else
@@ -100,6 +100,7 @@ def author_stage_metadata(layer: Any, contents: Contents, microseconds_per_time_
         "colorMap": colormap.NAME,
         "colorRange": Gf.Vec2d(*contents.pressure_range),
         "particlesEvery": contents.particles_every,
+        "charges": Vt.StringArray([charge.name for charge in scene.charges]),
     }
 
 
@@ -134,6 +135,13 @@ def particle_widths(contents: Contents) -> np.ndarray:
     return np.cbrt(contents.particles_every * shown).astype(np.float32)
 
 
+def _charge_numbers(contents: Contents) -> np.ndarray:
+    """Which charge each particle is of, (particles shown,) int32."""
+    counts = [len(charge.positions) for charge in contents.scene.charges]
+    numbers = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    return np.ascontiguousarray(numbers[:: contents.particles_every])
+
+
 def _author_particles(stage: Any, contents: Contents, material: Any) -> None:
     points = UsdGeom.Points.Define(stage, PARTICLES)
     points.CreatePointsAttr()
@@ -143,6 +151,9 @@ def _author_particles(stage: Any, contents: Contents, material: Any) -> None:
     ids = np.arange(0, contents.scene.particle_count, contents.particles_every, dtype=np.int64)
     points.CreateIdsAttr(Vt.Int64Array.FromNumpy(ids))
     _declare_pressure(points)
+    charge = UsdGeom.PrimvarsAPI(points).CreatePrimvar("charge", _INTEGERS, UsdGeom.Tokens.vertex)
+    charge.Set(Vt.IntArray.FromNumpy(_charge_numbers(contents)))
+    charge.GetAttr().SetDocumentation("number of the particle's charge, as the metadata's charges count, from 0")
     for name in contents.fields:
         primvar = UsdGeom.PrimvarsAPI(points).CreatePrimvar(name, _field_type(name), UsdGeom.Tokens.vertex)
         primvar.GetAttr().SetDocumentation(f"{name} [{FIELD_UNITS[name]}]")

@@ -1,6 +1,6 @@
 """Writes the frames of a run, finished or killed, as time series for ParaView and whatever else reads VTK's files.
 
-    <name>.pvd              plays the particles: pressure [Pa], further fields, and their ids
+    <name>.pvd              plays the particles: pressure [Pa], charge, further fields, and their ids
     <name>_section.pvd      plays the section plane: pressure [Pa]; one such file for every further surface
     <name>_frames/*.vtu     a file for each frame of each of them
     <name>_isochrones.vtu   curves, which do not change in time: arrival_time [s]; so for every set of them
