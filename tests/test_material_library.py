@@ -9,7 +9,7 @@ from scenes_for_tests import TNT
 import warp_mpm as mpm
 from warp_mpm.checks import plain_name
 from warp_mpm.cli import main
-from warp_mpm.exact.chapman_jouguet import pressure_of
+from warp_mpm.exact.chapman_jouguet import chapman_jouguet_state, pressure_of
 from warp_mpm.exact.reflection import collision_pressure
 from warp_mpm.kernels.burn.compression import CompressionBurn
 from warp_mpm.kernels.burn.programmed_compression import ProgrammedCompressionBurn
@@ -208,6 +208,26 @@ def test_a_file_of_materials(file):
     brine = materials["brine"]
     assert brine.burn is None
     assert pressure_of(brine.equation_of_state, 1030.0, brine.specific_energy) == pytest.approx(101325.0, abs=1000.0)
+
+
+@pytest.mark.parametrize("energy", ["cj", 3.84e6])
+def test_a_speed_below_all_that_a_law_gives_is_one_line(energy):
+    """A layer of ANFO runs at 2500 m/s, the fit for wide charges at no less than its law has without any energy."""
+    law, density = mpm.find_material("anfo_820").equation_of_state, 820.0
+    least = chapman_jouguet_state(law, density, 1.0).detonation_speed
+    assert 2500.0 < least < 4550.0
+    with pytest.raises(mpm.InputError, match=r"^layer: detonation_speed: expected .*, got 2500; ") as caught:
+        mpm.explosive("layer", density=density, detonation_speed=2500.0, equation_of_state=law, energy=energy)
+    says = f"{least:.0f} m/s with hardly any" if energy == "cj" else "; use on_mismatch=keep"
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize("energy", ["cj", 4e6])
+@pytest.mark.parametrize("law", [mpm.MieGruneisen(1e3, 2e3, 0.0, 0.1), mpm.StiffenedGas(4.4, 6e12)])
+def test_an_explosive_that_no_wave_can_run_through_is_one_line(law, energy):
+    """Without a sonic compression, or with one under tension alone."""
+    with pytest.raises(mpm.InputError, match=r"^it: equation_of_state: .* found none; check the parameters' units$"):
+        mpm.explosive("it", density=1630.0, detonation_speed=6930.0, equation_of_state=law, energy=energy)
 
 
 def changed(old, new):

@@ -25,6 +25,7 @@ ROUND_OFF = 1e-5  # relative difference of two speeds that are the same: single 
 ATMOSPHERE = 101325.0  # standard pressure [Pa]
 NOTABLE = 1e-3  # relative difference of a speed that is worth a warning
 TOLERANCE = 0.01  # and the largest that is adjusted; more is an error
+FAINT = 1e-6  # of the square of a speed: an energy [J/kg] that adds nothing to it
 SLOWEST = 200.0  # detonation of anything [m/s]
 DENSEST_GAS = 50.0  # that detonates [kg/m3]
 FASTEST_IN_GAS = 4500.0  # detonation [m/s]; hydrogen and oxygen come to some 3000
@@ -115,7 +116,7 @@ def explosive(
     start_quietly()  # the check evaluates device functions, which starts Warp
     _check_heat(name, equation_of_state, density)
     specific_energy = _specific_energy(name, energy, equation_of_state, density, detonation_speed)
-    state = chapman_jouguet_state(equation_of_state, density, specific_energy)
+    state = _detonation(name, equation_of_state, density, specific_energy)
     speed, warnings = _matched_speed(name, density, detonation_speed, equation_of_state, state, on_mismatch)
     if cj_pressure is not None:
         _check_positive(name, "cj_pressure", cj_pressure, "Pa")
@@ -178,9 +179,31 @@ def ammonium_nitrate(*, energy: float | Literal["cj"] = "cj", on_mismatch: OnMis
 def _specific_energy(name: str, energy: float | str, eos: EquationOfState, density: float, speed: float) -> float:
     """The energy [J/kg] given, or for "cj" that with which the wave runs at `speed` [m/s]."""
     if isinstance(energy, str) and energy == "cj":
-        return energy_for_speed(eos, density, speed)
+        consistent = _consistent_energy(eos, density, speed)
+        if consistent is None:
+            slowest = _detonation(name, eos, density, FAINT * speed**2).detonation_speed
+            expected = f"a speed that some energy gives its equation of state ({slowest:.0f} m/s with hardly any)"
+            remedy = "take another equation of state, such as IdealGas"
+            raise checks.mistake(f"{name}: detonation_speed", expected, f"{speed:g}", remedy)
+        return consistent
     _check_positive(name, "energy", energy, "J/kg")
     return float(energy)
+
+
+def _consistent_energy(eos: EquationOfState, density: float, speed: float) -> float | None:
+    """The energy [J/kg] with which the wave runs at `speed` [m/s], if there is one."""
+    try:
+        return energy_for_speed(eos, density, speed)
+    except ValueError:
+        return None
+
+
+def _detonation(name: str, eos: EquationOfState, density: float, energy: float) -> ChapmanJouguetState:
+    """The Chapman-Jouguet state, which an explosive must have."""
+    try:
+        return chapman_jouguet_state(eos, density, energy)
+    except ValueError as error:
+        raise InputError(f"{name}: equation_of_state: {error}") from error
 
 
 def _burn_law(burn: Burn, speed: float, density: float, state: ChapmanJouguetState) -> BurnLaw:
@@ -216,10 +239,11 @@ def _matched_speed(
         return implied, (
             f"{name}: runs at {implied:.1f} m/s, which its equation of state implies, not at the stated {stated:g} m/s",
         )
-    consistent = energy_for_speed(equation_of_state, density, stated)
+    consistent = _consistent_energy(equation_of_state, density, stated)
+    other = "" if consistent is None else f"energy={consistent:.4g} J/kg, energy=cj, or "
     raise InputError(
         f"{name}: detonation_speed: expected the {implied:.0f} m/s (to 1 %) that its equation of state implies with "
-        f"this energy, got {stated:g}; use energy={consistent:.4g} J/kg, energy=cj, or on_mismatch=keep to run it as is"
+        f"this energy, got {stated:g}; use {other}on_mismatch=keep to run it as is"
     )
 
 

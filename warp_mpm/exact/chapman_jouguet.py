@@ -69,7 +69,7 @@ def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: 
     """The Chapman-Jouguet state for an initial density [kg/m3] and specific energy E0 [J/kg].
 
     Raises:
-        ValueError: the equation of state has no such state up to a compression of 20.
+        ValueError: the equation of state has no such state, with a pressure above zero, up to a compression of 20.
     """
     initial_volume = 1.0 / initial_density
 
@@ -87,19 +87,25 @@ def chapman_jouguet_state(eos: EquationOfState, initial_density: float, energy: 
     while excess(high) < 0.0:
         low, high = high, high * SEARCH_STEP
         if high > HIGHEST_COMPRESSION * initial_density:
-            raise ValueError(
-                f"{eos}: expected a Chapman-Jouguet state below {HIGHEST_COMPRESSION:g} times the initial density "
-                f"{initial_density:g} kg/m3 with the energy {energy:g} J/kg, found none; check the parameters' units"
-            )
+            raise _no_state(eos, initial_density, energy)
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) < 0.0 else (low, middle)
     density = 0.5 * (low + high)
     pressure = hugoniot_pressure(eos, initial_density, energy, density)
+    if not pressure > 0.0:
+        raise _no_state(eos, initial_density, energy)
     compression = initial_volume - 1.0 / density
     speed = initial_volume * math.sqrt(pressure / compression)
     particle_velocity = speed * compression / initial_volume
     return ChapmanJouguetState(speed, pressure, density, particle_velocity, speed - particle_velocity)
+
+
+def _no_state(eos: EquationOfState, initial_density: float, energy: float) -> ValueError:
+    return ValueError(
+        f"{eos}: expected a Chapman-Jouguet state below {HIGHEST_COMPRESSION:g} times the initial density "
+        f"{initial_density:g} kg/m3 with the energy {energy:g} J/kg, found none; check the parameters' units"
+    )
 
 
 def energy_for_speed(eos: EquationOfState, initial_density: float, detonation_speed: float) -> float:
