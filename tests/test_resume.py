@@ -22,9 +22,10 @@ from warp_mpm.config import Layout, Save, SolverConfig
 from warp_mpm.errors import InputError, Terminated
 from warp_mpm.output.checkpoint import checkpoint_files
 from warp_mpm.progress import Silent
+from warp_mpm.result import Result
 from warp_mpm.scene import Wall, Walls
 from warp_mpm.scene_loading import load_scene
-from warp_mpm.simulation import Result, simulate
+from warp_mpm.simulation import simulate
 
 STEPS = 68  # of the whole run
 OF_THE_MACHINE = ("wall_s", "solver_wall_s", "ns_per_particle_step", "threads", "device", "version")

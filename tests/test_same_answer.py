@@ -14,9 +14,10 @@ import warp as wp
 
 from warp_mpm import launch
 from warp_mpm.config import Layout, Save
+from warp_mpm.result import Result
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.section import section_pressure
-from warp_mpm.simulation import Result, simulate
+from warp_mpm.simulation import simulate
 from warp_mpm.state import PARTICLE_ARRAYS
 
 NUMBERS = Save(frames=2, figures=False)

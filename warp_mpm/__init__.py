@@ -38,10 +38,11 @@ if TYPE_CHECKING:
     from warp_mpm.mesh_files import load_mesh
     from warp_mpm.output.progress_bar import progress_on
     from warp_mpm.output.tables import print_summary
+    from warp_mpm.result import Result
     from warp_mpm.run_directory import Run, load
     from warp_mpm.scene import Scene, Wall, Walls
     from warp_mpm.scene_loading import list_scenes, load_scene
-    from warp_mpm.simulation import Result, simulate
+    from warp_mpm.simulation import simulate
 
 __version__ = version.VERSION
 
@@ -125,10 +126,11 @@ _HOMES = {
     "materials": ("Burn", "Material", "OnMismatch", "ammonium_nitrate", "explosive", "inert"),
     "output.progress_bar": ("progress_on",),
     "output.tables": ("print_summary",),
+    "result": ("Result",),
     "run_directory": ("Run", "load"),
     "scene": ("Scene", "Wall", "Walls"),
     "scene_loading": ("list_scenes", "load_scene"),
-    "simulation": ("Result", "simulate"),
+    "simulation": ("simulate",),
 }
 
 

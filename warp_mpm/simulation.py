@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from warp_mpm.output.description import scene_values
 from warp_mpm.output.frame import Frame, SectionPicture, StepRecord
 from warp_mpm.progress import Progress, Silent, opening
 from warp_mpm.recorder import Recorder
+from warp_mpm.result import Result
 from warp_mpm.run_directory import FIGURES, STEPS, SUMMARY, load, remove_results
 from warp_mpm.scene import Scene, Wall
 from warp_mpm.section import section_pressure
@@ -39,18 +40,6 @@ from warp_mpm.version import VERSION
 GROWTH = 1.1  # of the time step, at most; as in kernels.reduce
 STEPS_BETWEEN_AUDITS = 100  # at most: errors are looked for between frames too, however few there are
 STEPS_AT_ONCE = 4  # on a GPU, so that the drift between two looks at it stays below a cell or two
-
-
-@dataclass(frozen=True)
-class Result:
-    """What a run gives back."""
-
-    summary: dict[str, Any] = field(repr=False)  # as in summary.json
-    history: list[dict[str, float]] = field(repr=False)  # as in history.csv, one row a frame
-    record: StepRecord = field(repr=False)  # every step
-    pictures: tuple[SectionPicture, ...] = field(repr=False)  # the section at the scene's picture instants
-    state: State = field(repr=False)  # at the end
-    output: Path | None  # the run directory
 
 
 @taking_turns

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from warp_mpm.config import SolverConfig
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
-from warp_mpm.simulation import Result
 
 # ---- what is asked ---------------------------------------------------------------------------------------------------
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from warp_mpm.exact.diverging_taylor_wave import DivergingTaylorWave
 from warp_mpm.exact.taylor_wave import PlanarTaylorWave
-from warp_mpm.simulation import Result
+from warp_mpm.result import Result
 from warp_mpm.verification.fields import ExactFlow, cell_pressure, cell_radii, radius_of
 from warp_mpm.verification.norms import mean_and_scatter
 from warp_mpm.verification.problem import Bound

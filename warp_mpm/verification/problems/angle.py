@@ -10,8 +10,8 @@ from warp_mpm.detonators import PlaneDetonator
 from warp_mpm.exact.taylor_wave import PlanarTaylorWave
 from warp_mpm.geometry import Box, Solid
 from warp_mpm.materials import ammonium_nitrate
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene, Wall, Walls
-from warp_mpm.simulation import Result
 from warp_mpm.verification.problem import (
     DISTANCE,
     PRESSURE,

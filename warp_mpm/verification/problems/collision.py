@@ -10,8 +10,8 @@ from warp_mpm.exact.collision import PlaneCollision
 from warp_mpm.geometry import Box
 from warp_mpm.materials import ammonium_nitrate
 from warp_mpm.output.frame import LineRecord
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene, Wall, Walls
-from warp_mpm.simulation import Result
 from warp_mpm.verification.problem import (
     PRESSURE,
     Axis,

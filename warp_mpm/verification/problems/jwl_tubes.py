@@ -11,8 +11,8 @@ from warp_mpm.exact.general_riemann import GeneralRiemannProblem, MatterState
 from warp_mpm.geometry import Box
 from warp_mpm.material_library import find_material, water
 from warp_mpm.materials import Material
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import (
     FIELD_NAMES,
     ExactFlow,

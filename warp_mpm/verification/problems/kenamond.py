@@ -10,8 +10,8 @@ from warp_mpm.exact import kenamond
 from warp_mpm.geometry import Box, Cylinder, Solid, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.materials import Material, explosive
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.problem import (
     DISTANCE,
     Axis,

@@ -11,8 +11,8 @@ from warp_mpm.exact.noh import NohImplosion
 from warp_mpm.geometry import Box
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.materials import Material
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene, Wall, Walls
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import (
     ExactFlow,
     cell_radii,

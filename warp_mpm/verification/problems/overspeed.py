@@ -9,8 +9,8 @@ from warp_mpm.detonators import PlaneDetonator
 from warp_mpm.exact.burn_zone import BurnZone
 from warp_mpm.geometry import Box
 from warp_mpm.materials import OnMismatch, ammonium_nitrate
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene, Wall, Walls
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import cell_pressure
 from warp_mpm.verification.norms import mean_and_scatter
 from warp_mpm.verification.problem import (

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
 from warp_mpm.scene_loading import load_scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import computed_fields, exact_curves, field_errors, planar_curves, planar_means
 from warp_mpm.verification.problem import (
     DISTANCE,

@@ -6,9 +6,9 @@ import numpy as np
 
 from warp_mpm.config import SolverConfig, Transfer
 from warp_mpm.exact.taylor_wave import PlanarTaylorWave
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
 from warp_mpm.scene_loading import load_scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.problem import (
     PRESSURE,
     TIME,

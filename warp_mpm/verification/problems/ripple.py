@@ -9,8 +9,8 @@ from warp_mpm.detonators import LineDetonator, PlaneDetonator
 from warp_mpm.geometry import Box, Cylinder
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.materials import ammonium_nitrate, explosive
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.problem import (
     Axis,
     Bound,

@@ -9,8 +9,8 @@ from warp_mpm.exact.sedov import SedovBlast
 from warp_mpm.geometry import Box, Sphere
 from warp_mpm.kernels.eos.ideal_gas import IdealGas
 from warp_mpm.materials import Material
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import (
     ExactFlow,
     FlowField,

@@ -6,10 +6,10 @@ import numpy as np
 
 from warp_mpm.exact.air_blast import incident_overpressure
 from warp_mpm.materials import ATMOSPHERE
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
 from warp_mpm.scenes import sphere_in_air
 from warp_mpm.scenes.sphere_in_air import GAUGES, RADIUS, SIZE
-from warp_mpm.simulation import Result
 from warp_mpm.verification.problem import Axis, Bound, Curve, Level, Measurement, Panel, Problem, ladder
 
 NEAREST = 3  # charge radii from which on the pressures are shown

@@ -11,8 +11,8 @@ from warp_mpm.detonators import PointDetonator
 from warp_mpm.exact.diverging_taylor_wave import DivergingTaylorWave
 from warp_mpm.geometry import Box
 from warp_mpm.materials import ammonium_nitrate
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import computed_fields, exact_curves, field_errors, radial_curves, radial_means
 from warp_mpm.verification.problem import RADIUS, Bound, Curve, Level, Measurement, Problem, field_panels, ladder
 from warp_mpm.verification.problems._taylor import (

@@ -7,9 +7,9 @@ import numpy as np
 
 from warp_mpm.exact.burn_zone import BurnZone
 from warp_mpm.exact.taylor_wave import PlanarTaylorWave
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
 from warp_mpm.scene_loading import load_scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import computed_fields, exact_curves, field_errors, planar_curves, planar_means
 from warp_mpm.verification.problem import DISTANCE, Bound, Curve, Level, Measurement, Problem, field_panels, ladder
 from warp_mpm.verification.problems._taylor import DENSITY, GAMMA, REFERENCE, SPEED, taylor_flow

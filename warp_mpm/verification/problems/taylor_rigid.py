@@ -9,8 +9,8 @@ from warp_mpm.detonators import PlaneDetonator
 from warp_mpm.exact.taylor_wave import RIGID, PlanarTaylorWave
 from warp_mpm.geometry import Box
 from warp_mpm.materials import ammonium_nitrate
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import computed_fields, exact_curves, field_errors, planar_curves, planar_means
 from warp_mpm.verification.problem import DISTANCE, Bound, Curve, Level, Measurement, Problem, field_panels, ladder
 from warp_mpm.verification.problems._taylor import (

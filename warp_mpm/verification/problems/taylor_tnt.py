@@ -9,9 +9,9 @@ from warp_mpm.exact.general_taylor_wave import general_taylor_wave
 from warp_mpm.exact.similar_flow import SimilarFlow
 from warp_mpm.material_library import find_material
 from warp_mpm.materials import Material
+from warp_mpm.result import Result
 from warp_mpm.scene import Scene
 from warp_mpm.scene_loading import load_scene
-from warp_mpm.simulation import Result
 from warp_mpm.verification.fields import (
     ExactFlow,
     computed_fields,
