@@ -15,7 +15,7 @@ import pytest
 import warp as wp
 from scenes_for_tests import ORDERS_AND_TRANSFERS, advance, block, start
 
-from warp_mpm import launch
+from warp_mpm import launch, stopping
 from warp_mpm.checkpoint import restore_solver, saved_solver
 from warp_mpm.cli import main
 from warp_mpm.config import Layout, Save, SolverConfig
@@ -43,15 +43,16 @@ def save(**settings):
 
 
 class StopAt(Silent):
-    """Asks the run to stop while it is in a step."""
+    """Asks the run to stop while it is in a step, once or several times."""
 
-    def __init__(self, step: int, number: signal.Signals = signal.SIGINT) -> None:
-        self.step, self.signal = step, number
+    def __init__(self, step: int, *signals: signal.Signals) -> None:
+        self.step, self.signals = step, signals or (signal.SIGINT,)
 
     def update(self, time: float, end_time: float, step: int, note: str) -> None:
         """Ask after a certain step."""
         if step == self.step:
-            signal.raise_signal(self.signal)
+            for number in self.signals:
+                signal.raise_signal(number)
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +119,27 @@ def test_a_stopped_run_goes_on_as_if_it_had_not(uninterrupted, tmp_path, monkeyp
     assert (float(last[0]), int(last[1])) == (summary["end_time_s"], step)  # its frame is there too
     assert resume(tmp_path).summary["steps"] == STEPS
     assert_same_results(tmp_path, uninterrupted)
+
+
+def test_a_signal_right_after_another_is_the_same_request(uninterrupted, tmp_path):
+    """As a pool of processes sends it: SIGTERM to those that Ctrl-C has just reached."""
+    both = StopAt(30, signal.SIGINT, signal.SIGTERM)
+    with pytest.raises(KeyboardInterrupt, match="interrupted at"):
+        simulate(scene(), save=save(), output=tmp_path, threads=1, progress=both)
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    resume(tmp_path)
+    assert_same_results(tmp_path, uninterrupted)
+
+
+def test_a_signal_a_second_later_ends_a_run_at_once(tmp_path, monkeypatch):
+    """Without a checkpoint: the step does not come to its end."""
+    monkeypatch.setattr(stopping, "TOGETHER", -1.0)
+    twice = StopAt(30, signal.SIGINT, signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt) as ended:
+        simulate(scene(), save=save(), output=tmp_path, threads=1, progress=twice)
+    assert str(ended.value) == ""
+    assert checkpoint_files(tmp_path) == []
+    assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
 
 
 def test_sigterm_stops_a_run_in_good_order(uninterrupted, tmp_path):

@@ -57,8 +57,8 @@ def simulate(
     """Simulate a scene to its end time.
 
     Asked to stop by SIGINT (Ctrl-C) or SIGTERM, it ends the step, saves what there is with a checkpoint, and raises
-    KeyboardInterrupt or `Terminated`; asked twice, it stops at once. Called in a thread while another runs one, it
-    waits: one run uses all cores, and several at a time want a process each.
+    KeyboardInterrupt or `Terminated`; asked again after a second, it stops at once. Called in a thread while another
+    runs one, it waits: one run uses all cores, and several at a time want a process each.
 
     Args:
         scene: what is simulated.
@@ -158,11 +158,11 @@ class _Run:
                     self.progress.update(now, end, self.steps, f"peak {peak / 1e9:.2f} GPa")
                     if now < end and self.checkpoints.due(self.steps):
                         self._write_checkpoint()
-            if now < end:
-                self._write_checkpoint()
-                if self.history[-1]["step"] < self.steps:  # the state at the stop; who goes on writes this frame anew
-                    self._save_frames(write, now, 1)
-                raise stop.exception(f"interrupted at {now * 1e6:.3f} us{self.checkpoints.remedy()}")
+                if now < end:
+                    self._write_checkpoint()
+                    if self.history[-1]["step"] < self.steps:  # the state at the stop; who goes on writes it anew
+                        self._save_frames(write, now, 1)
+                    raise stop.exception(f"interrupted at {now * 1e6:.3f} us{self.checkpoints.remedy()}")
 
     def sum_up(self, status: str) -> None:
         """Sum up a run that has stopped before its end; before the first frame there is nothing to sum up."""
