@@ -222,13 +222,14 @@ def test_run_then_info_figures_and_export(capfd, tmp_path, monkeypatch):
 
 def test_what_the_usd_file_holds_can_be_chosen(capfd, tmp_path):
     layout = ["--layout", "clips", "--usdz", "--particles-every", "3"]
-    contents = ["--fields", "density", "arrival_time", "--isosurface", "1e9"]
+    contents = ["--fields", "density", "arrival_time", "--isosurface", "1e9", "--no-figures"]
     assert main(["run", "two_point", "--set", *COARSE, "--frames", "2", "-o", str(tmp_path), *layout, *contents]) == 0
     assert main(["info", str(tmp_path / "two_point.usda")]) == 0
     text = capfd.readouterr().out
     for words in ("density", "arrival_time", "/World/isosurface", "particlesEvery: 3"):
         assert words in text
     assert (tmp_path / "two_point.usdz").exists()
+    assert not (tmp_path / "figures").exists()
 
 
 def test_importing_the_package_is_light():

@@ -164,6 +164,7 @@ def _add_saving(parser: argparse.ArgumentParser) -> None:
         help="also show in the USD file where the pressure has this value [Pa]",
     )
     parser.add_argument("--usdz", action="store_true", help="also pack the USD file into a .usdz")
+    parser.add_argument("--no-figures", action="store_true", help="no pictures; 'warp-mpm figures' draws them later")
     parser.add_argument(
         "--checkpoint-steps",
         metavar="N",
@@ -188,6 +189,7 @@ def _save(options: argparse.Namespace) -> Save:
     return Save(
         frames=options.frames,
         fields=tuple(options.fields),
+        figures=not options.no_figures,
         layout=Layout(options.layout),
         particles_every=options.particles_every,
         isosurface=options.isosurface,
