@@ -99,17 +99,30 @@ class Layout(Enum):
 
 @dataclass(frozen=True)
 class Save:
-    """When and what to save."""
+    """When and what to save.
 
-    frames: int = 60  # including the first and the last
-    fields: tuple[str, ...] = ()  # further particle fields in the USD file, from `PARTICLE_FIELDS`
-    figures: bool = True  # draw the pictures at the end
-    layout: Layout = Layout.AUTO  # of the USD file
-    particles_every: int = 1  # the USD file has one particle in so many, in creation order
-    isosurface: float | None = None  # also show where the field pressure has this value [Pa]
-    usdz: bool = False  # also pack the USD file into a .usdz
-    checkpoint_steps: int | None = None  # a checkpoint at least every so many steps; None: by the clock alone
-    checkpoint_minutes: float = 10.0  # and at least every so many minutes
+    Attributes:
+        frames: how many, including the first and the last.
+        fields: further particle fields in the USD file: "density", "burn_fraction", "arrival_time",
+            "particleVelocity".
+        figures: draw the pictures at the end.
+        layout: of the USD file.
+        particles_every: the USD file has one particle in so many, in creation order.
+        isosurface: also show where the field pressure has this value [Pa].
+        usdz: also pack the USD file into a .usdz.
+        checkpoint_steps: a checkpoint at least every so many steps; None: by the clock alone.
+        checkpoint_minutes: and at least every so many minutes.
+    """
+
+    frames: int = 60
+    fields: tuple[str, ...] = ()
+    figures: bool = True
+    layout: Layout = Layout.AUTO
+    particles_every: int = 1
+    isosurface: float | None = None
+    usdz: bool = False
+    checkpoint_steps: int | None = None
+    checkpoint_minutes: float = 10.0
 
     def __post_init__(self) -> None:
         """Check the values.

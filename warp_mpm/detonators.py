@@ -14,32 +14,53 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class PointDetonator:
-    """Lights the charge it lies in, or the named charges, at one point."""
+    """Lights the charge it lies in, or the named charges, at one point.
 
-    position: Vector  # [m]
-    time: float = 0.0  # ignition [s]
-    charges: tuple[str, ...] = ()  # names of the charges it lights; none: the charge it lies in
-    booster: bool = True  # particles within one cell burn at once
+    Attributes:
+        position: where [m].
+        time: of ignition [s].
+        charges: names of the charges it lights; none: the charge it lies in.
+        booster: whether particles within one cell burn at once.
+    """
+
+    position: Vector
+    time: float = 0.0
+    charges: tuple[str, ...] = ()
+    booster: bool = True
 
 
 @dataclass(frozen=True)
 class PlaneDetonator:
-    """Lights a whole plane at once: the wave runs along +normal and -normal. For one-dimensional waves."""
+    """Lights a whole plane at once: the wave runs along +normal and -normal. For one-dimensional waves.
 
-    position: Vector  # a point of the plane [m]
-    normal: Vector  # any length
-    time: float = 0.0  # ignition [s]
-    charges: tuple[str, ...] = ()  # names of the charges it lights; none: every charge the plane cuts or touches
+    Attributes:
+        position: a point of the plane [m].
+        normal: of any length.
+        time: of ignition [s].
+        charges: names of the charges it lights; none: every charge the plane cuts or touches.
+    """
+
+    position: Vector
+    normal: Vector
+    time: float = 0.0
+    charges: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class LineDetonator:
-    """Lights a straight line at once."""
+    """Lights a straight line at once.
 
-    start: Vector  # [m]
-    end: Vector  # [m]
-    time: float = 0.0  # ignition [s]
-    charges: tuple[str, ...] = ()  # names of the charges it lights; none: every charge it runs through or along
+    Attributes:
+        start: one end [m].
+        end: the other [m].
+        time: of ignition [s].
+        charges: names of the charges it lights; none: every charge it runs through or along.
+    """
+
+    start: Vector
+    end: Vector
+    time: float = 0.0
+    charges: tuple[str, ...] = ()
 
     @property
     def position(self) -> Vector:
@@ -49,12 +70,19 @@ class LineDetonator:
 
 @dataclass(frozen=True)
 class SphereDetonator:
-    """Lights the surface of a sphere at once: waves run outwards and inwards."""
+    """Lights the surface of a sphere at once: waves run outwards and inwards.
 
-    center: Vector  # [m]
-    radius: float  # [m]
-    time: float = 0.0  # ignition [s]
-    charges: tuple[str, ...] = ()  # names of the charges it lights; none: every charge that holds a part of it
+    Attributes:
+        center: of the sphere [m].
+        radius: of the sphere [m].
+        time: of ignition [s].
+        charges: names of the charges it lights; none: every charge that holds a part of it.
+    """
+
+    center: Vector
+    radius: float
+    time: float = 0.0
+    charges: tuple[str, ...] = ()
 
     @property
     def position(self) -> Vector:
@@ -64,12 +92,19 @@ class SphereDetonator:
 
 @dataclass(frozen=True)
 class CordDetonator:
-    """A detonating cord: it burns from its first point to its last, and lights what it runs through or along."""
+    """A detonating cord: it burns from its first point to its last, and lights what it runs through or along.
 
-    points: tuple[Vector, ...]  # of the polyline [m], two or more
-    speed: float  # along the cord [m/s]
-    time: float = 0.0  # ignition of the first point [s]
-    charges: tuple[str, ...] = ()  # names of the charges it lights; none: every charge it runs through or along
+    Attributes:
+        points: of the polyline [m], two or more.
+        speed: along the cord [m/s].
+        time: of ignition of the first point [s].
+        charges: names of the charges it lights; none: every charge it runs through or along.
+    """
+
+    points: tuple[Vector, ...]
+    speed: float
+    time: float = 0.0
+    charges: tuple[str, ...] = ()
 
     @property
     def position(self) -> Vector:

@@ -59,21 +59,34 @@ class Material:
 
     Its initial pressure is that of its equation of state; for an ideal gas (gamma - 1) rho0 e.
 
+    Attributes:
+        name: for messages and tables.
+        density: initial, rho0 [kg/m3].
+        equation_of_state: of inert matter, and of an explosive's products.
+        specific_energy: initial, chemical energy included [J/kg].
+        burn: the burn law; None: inert, it is products from the start.
+        cj: the Chapman-Jouguet state that the equation of state implies.
+        warnings: what the check of the explosive has to say.
+        unreacted: equation of state of what has not burnt, with energies from E0; None: that has no pressure.
+        stated_speed: detonation speed stated for it [m/s].
+        stated_pressure: Chapman-Jouguet pressure stated for it [Pa].
+        citation: where the numbers are from.
+
     Raises:
         InputError: density or energy is not a positive finite number.
     """
 
     name: str
-    density: float  # initial, rho0 [kg/m3]
+    density: float
     equation_of_state: EquationOfState
-    specific_energy: float  # initial, chemical energy included [J/kg]
-    burn: BurnLaw | None = None  # None: inert, it is products from the start
-    cj: ChapmanJouguetState | None = None  # what the equation of state implies
-    warnings: tuple[str, ...] = ()  # what the check of the explosive has to say
-    unreacted: EquationOfState | None = None  # of what has not burnt, with energies from E0; None: it has no pressure
-    stated_speed: float | None = None  # detonation speed stated for it [m/s]
-    stated_pressure: float | None = None  # Chapman-Jouguet pressure stated for it [Pa]
-    citation: str = ""  # where the numbers are from
+    specific_energy: float
+    burn: BurnLaw | None = None
+    cj: ChapmanJouguetState | None = None
+    warnings: tuple[str, ...] = ()
+    unreacted: EquationOfState | None = None
+    stated_speed: float | None = None
+    stated_pressure: float | None = None
+    citation: str = ""
 
     def __post_init__(self) -> None:
         """Check the values."""

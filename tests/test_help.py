@@ -1,0 +1,31 @@
+"""What `help` says of the classes that people make, or are given: all of their fields, which no comment would show."""
+
+import re
+from dataclasses import fields
+
+import pytest
+
+import warp_mpm as mpm
+from warp_mpm.config import PARTICLE_FIELDS
+
+EXPLAINED = (
+    mpm.CordDetonator,
+    mpm.LineDetonator,
+    mpm.Material,
+    mpm.PlaneDetonator,
+    mpm.PointDetonator,
+    mpm.Result,
+    mpm.Save,
+    mpm.SphereDetonator,
+)
+
+
+@pytest.mark.parametrize("kind", EXPLAINED)
+def test_every_field_is_explained(kind):
+    attributes = kind.__doc__.partition("Attributes:\n")[2].partition("\n\n")[0]
+    named = re.findall(r"^ {8}(\w+): \S", attributes, flags=re.MULTILINE)
+    assert named == [field.name for field in fields(kind)]
+
+
+def test_every_field_that_can_be_saved_is_named():
+    assert [name for name in PARTICLE_FIELDS if f'"{name}"' not in mpm.Save.__doc__] == []
