@@ -289,9 +289,10 @@ def update_kernel(
             work = wp.float64(ambient_pressure * dt * step.work_divergence) * wp.float64(mass / matter.density)
             wp.atomic_add(tallies, slab * TALLIES + AMBIENT_WORK, work)
         energy = matter.energy + gained
-        if energy < ZERO:
-            wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
-            energy = ZERO
+        if wp.static(not eos.negative_energy):
+            if energy < ZERO:
+                wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
+                energy = ZERO
 
         # Density follows the strain, and inside the material relaxes to the room, and the pressure, around it.
         density = matter.density / (ONE + dt * step.divergence)
@@ -347,7 +348,9 @@ def update_kernel(
             since_arrival,
             since_booster,
         )
-        if not (density > ZERO and energy < HUGE and wp.abs(response.pressure) < HUGE):  # nor if one is not a number
+        if not (
+            density > ZERO and wp.abs(energy) < HUGE and wp.abs(response.pressure) < HUGE
+        ):  # nor if one is not a number
             report_fault(particles, p, slab, faults)
         matter.density = density
         matter.energy = energy

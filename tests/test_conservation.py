@@ -1,8 +1,8 @@
 """Mass, momentum and energy are conserved to round-off, everything that crosses the domain's faces counted.
 
-Sources: the energy update and the conservative damping are derived in DESIGN.md, section 3.1, and in
-`kernels/material.py`; wall impulses in `kernels/walls.py`. Figures are those of the run's own audit
-(`warp_mpm.conservation.Audit`), which adds single-precision particles up in double.
+Sources: the energy update and the conservative damping are derived in `kernels/strain.py`; wall impulses in
+`kernels/walls.py`. Figures are those of the run's own audit (`warp_mpm.conservation.Audit`), which adds up
+single-precision particles in double.
 
 Tolerances. A particle's value is rounded once or twice a step, to 6e-8 of itself; over thousands of particles and
 dozens of steps these roundings average out, and what was seen is 1e-8 to 3e-7. `EXACT` leaves a factor of three; each
@@ -26,6 +26,8 @@ from scenes_for_tests import (
 
 from warp_mpm.config import Save, SolverConfig, Transfer
 from warp_mpm.conservation import totals_of
+from warp_mpm.kernels.eos.mie_gruneisen import MieGruneisen
+from warp_mpm.materials import inert
 from warp_mpm.scene import Wall, Walls
 from warp_mpm.scene_loading import load_scene
 from warp_mpm.simulation import simulate
@@ -63,6 +65,24 @@ def test_a_closed_box_conserves_everything(transfer, walls, device):
     assert np.abs(after.wall_impulse).max() > audit.largest_momentum
     assert after.released > 0.99 * before.internal
     assert after.kinetic > 0.001 * before.internal
+
+
+@conservative
+def test_metal_that_cools_below_its_initial_state_conserves_everything(transfer, device):
+    """Its energies count from there and may be negative, as here from the start on: nothing is added to them."""
+    copper = inert("copper", density=8930.0, equation_of_state=MieGruneisen(8930.0, 3940.0, 1.49, 2.0))
+    scene = block((8, 4, 3), material=copper, margin_cells=(0, 3, 0, 2, 0, 2))
+
+    def cold_and_thrown(state):
+        velocity = np.random.default_rng(3).normal(0.0, 5.0, (state.count, 3)) - np.array([100.0, 0.0, 0.0])
+        state.assign("velocity", velocity.astype(np.float32))
+        state.assign("energy", np.full(state.count, -5e4, np.float32))
+
+    solver = start(scene, device, transfer=transfer, prepare=cold_and_thrown)
+    audit = audited(solver, STEPS)
+    assert audit.energy_error < EXACT
+    assert totals_of(solver).clamped_energy == 0.0
+    assert solver.state.values("energy").min() < 0.0
 
 
 @conservative
@@ -224,7 +244,7 @@ def test_a_closed_box_stays_full(device):
     """The particles' volumes go on filling a rigid box, to the issue's 0.2 %, over many echoes of the detonation.
 
     For a gamma law volumes are passive, so that no other audit sees them drift: without the damping's relaxation of
-    density they do, by 0.7 % here (DESIGN.md, section 3.1).
+    density they do, by 0.7 % here.
     """
     volumes = []
     for transfer in (Transfer.DAMPED_FLIP, Transfer.FLIP):

@@ -4,6 +4,7 @@ import importlib
 import inspect
 import math
 import pkgutil
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -78,6 +79,19 @@ def test_sound_speed_is_the_slope_of_the_isentrope(eos, density, energy):
 
     slope = (on_isentrope(1.0 + share) - on_isentrope(1.0 - share)) / (2.0 * share * density)
     assert evaluate(eos, eos.sound_speed_squared, density, energy) == pytest.approx(slope, rel=60.0 * share**2)
+
+
+@pytest.mark.parametrize("kind", [int, np.float64, np.float32], ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("eos", STATES_OF, ids=str)
+def test_numbers_of_any_kind(eos, kind):
+    """Whole numbers, and those that a study takes from NumPy, are as good as any."""
+    numbers = {item.name: getattr(eos, item.name) for item in fields(eos)}
+    others = {name: kind(number) for name, number in numbers.items() if kind is not int or number == int(number)}
+    assert others or kind is int
+    for density, energy in STATES_OF[eos]:
+        assert pressure(replace(eos, **others), density, energy) == pytest.approx(
+            pressure(eos, density, energy), rel=1e-5
+        )
 
 
 @pytest.mark.parametrize("eos", STATES_OF, ids=str)

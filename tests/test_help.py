@@ -10,13 +10,18 @@ from warp_mpm.config import PARTICLE_FIELDS
 
 EXPLAINED = (
     mpm.CordDetonator,
+    mpm.IdealGas,
+    mpm.JWL,
     mpm.LineDetonator,
     mpm.Material,
+    mpm.MieGruneisen,
     mpm.PlaneDetonator,
     mpm.PointDetonator,
     mpm.Result,
     mpm.Save,
+    mpm.SolverConfig,
     mpm.SphereDetonator,
+    mpm.StiffenedGas,
 )
 
 

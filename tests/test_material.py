@@ -223,7 +223,7 @@ def test_chapman_jouguet_state_satisfies_its_conditions(eos):
 
 
 def test_the_papers_explosive():
-    """With gamma = 2 and D = 2800 m/s: E0 = D^2 / 6 = 1.307e6 J/kg, p_CJ = 2.613 GPa (DESIGN.md, section 2)."""
+    """With gamma = 2 and D = 2800 m/s: E0 = D^2 / 6 = 1.307e6 J/kg, p_CJ = 2.613 GPa."""
     anfo = ammonium_nitrate()
     assert anfo.specific_energy == pytest.approx(2800.0**2 / 6.0, rel=1e-6)
     assert anfo.cj.pressure == pytest.approx(2.6133e9, rel=1e-4)

@@ -127,6 +127,10 @@ def test_choices_and_unknown_names():
     assert set(mpm.library()) == set(NAMES)
     with pytest.raises(mpm.InputError, match=r"^material: expected one of tnt, .*, got 'tmt'; did you mean tnt\?$"):
         mpm.find_material("tmt")
+    with pytest.raises(mpm.InputError, match=r"^anfo_820: expected no choice but .*, got density; a material"):
+        mpm.find_material("anfo_820", density=700.0)
+    with pytest.raises(mpm.InputError, match=r"^water: expected no choices, got burn; "):
+        mpm.find_material("water", burn=mpm.Burn.BOTH)
     with pytest.raises(mpm.InputError, match=r"^material: expected one of tnt, .*, got 3$"):
         mpm.find_material(3)
 

@@ -156,7 +156,7 @@ def test_tnt_slab():
 
 
 def test_the_front_of_the_tnt_slab():
-    """A programmed burn's recorded front stays below p_CJ, by a share of n^(-2/3) after n cells (DESIGN.md, section 3).
+    """A programmed burn's recorded front stays below p_CJ, by a share of n^(-2/3) after n cells.
 
     That law is of the smallest burn width without viscosity and transfer; with them the power is a little lower.
     """

@@ -38,7 +38,7 @@ def test_every_variant_runs(order, transfer, shape, device):
     """30 steps with finite values, exact mass and the energy error that each variant is known to have.
 
     FLIP with MUSL conserves energy to round-off (`test_conservation.py`), the textbook updates to about a percent, and
-    APIC loses the velocities that the grid cannot see: 2-3 % (DESIGN.md, section 3), more in a few cells.
+    APIC loses the velocities that the grid cannot see: 2-3 %, more in a few cells.
     """
     solver = start(block((6, 4, 3)), device, shape=shape, order=order, transfer=transfer)
     audit = audited(solver, 30)

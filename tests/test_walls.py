@@ -1,9 +1,9 @@
 """Walls: a slip wall is a mirror plane, exactly; a stick wall holds; a column between slip walls is one-dimensional.
 
 Source: the method of images. Half of a symmetric flow, cut at its plane of symmetry, is the flow against a frictionless
-wall there; DESIGN.md, section 3, "Walls".
+wall there; `kernels/walls.py`.
 
-`SAME` is the issue's bound on 50 steps of single precision, relative to the scale of each quantity at the
+`SAME` is a bound on 50 steps of single precision, relative to the scale of each quantity at the
 Chapman-Jouguet state; seen are differences below 2e-6.
 """
 

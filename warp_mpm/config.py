@@ -43,16 +43,27 @@ class Transfer(Enum):
 
 @dataclass(frozen=True)
 class SolverConfig:
-    """How a scene is solved. One set of defaults for all problems."""
+    """How a scene is solved. One set of defaults for all problems.
+
+    Attributes:
+        shape: how a particle's extent is spread over the nodes.
+        order: when the strain is taken in the step.
+        transfer: how velocity goes from the grid back to the particles.
+        pic_share: 0: pure FLIP, 1: pure PIC; with transfer=flip only.
+        burn_width: width of the burn zone [cells]; None: the scene's, else 0.5.
+        viscosity: quadratic and linear coefficient of the artificial viscosity.
+        cfl: Courant number of the time step.
+        reproducible: on a GPU, the same answer, bit for bit, on every run, for more time; a CPU's always is.
+    """
 
     shape: ShapeFunction = ShapeFunction.BSPLINE
     order: Order = Order.MUSL
     transfer: Transfer = Transfer.DAMPED_FLIP
-    pic_share: float = 0.0  # 0: pure FLIP, 1: pure PIC; with transfer=flip only
-    burn_width: float | None = None  # width of the burn zone [cells]; None: the scene's, else 0.5
-    viscosity: tuple[float, float] = (1.5, 0.06)  # quadratic and linear coefficient of the artificial viscosity
-    cfl: float = 0.3  # Courant number of the time step
-    reproducible: bool = False  # on a GPU: the same answer, bit for bit, on every run, for more time; a CPU's always is
+    pic_share: float = 0.0
+    burn_width: float | None = None
+    viscosity: tuple[float, float] = (1.5, 0.06)
+    cfl: float = 0.3
+    reproducible: bool = False
 
     def __post_init__(self) -> None:
         """Check the values.

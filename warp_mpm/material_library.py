@@ -126,6 +126,9 @@ OTHER_NAMES = {"comp_b": "composition_b", "comp_c4": "c4", "composition_c4": "c4
 _BY_PLAIN_NAME = {plain_name(name): meant for name, meant in [*zip(NAMES, NAMES, strict=True), *OTHER_NAMES.items()]}
 
 
+CHOICES = ("on_mismatch", "burn", "unreacted")  # of an explosive of the library
+
+
 def find_material(name: str, **choices: Any) -> Material:
     """A material of the library.
 
@@ -134,15 +137,17 @@ def find_material(name: str, **choices: Any) -> Material:
         choices: of an explosive, as `explosive` takes them: on_mismatch, burn, unreacted.
 
     Raises:
-        InputError: there is no such material.
+        InputError: there is no such material, or no such choice.
     """
     expected = f"one of {', '.join(NAMES)}"
     known = _BY_PLAIN_NAME.get(plain_name(instance("material", name, str, expected)), "")
-    if known in _EXPLOSIVES:
-        return _EXPLOSIVES[known](**choices)
-    if known in _INERT:
-        return _INERT[known]()
-    raise mistake("material", expected, repr(name), closest_match(name, NAMES))
+    if not known:
+        raise mistake("material", expected, repr(name), closest_match(name, NAMES))
+    allowed = CHOICES if known in _EXPLOSIVES else ()
+    for other in choices.keys() - allowed:
+        remedy = "a material of your own is made by explosive(...) or inert(...)"
+        raise mistake(known, f"no choice but {', '.join(allowed)}" if allowed else "no choices", other, remedy)
+    return {**_EXPLOSIVES, **_INERT}[known](**choices)
 
 
 def library() -> dict[str, Material]:

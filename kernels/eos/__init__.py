@@ -8,6 +8,7 @@ dataclass (the host's side) whose class attributes name its device functions, ea
 * `sound_speed_squared(record, density, energy)` -> c^2 = (dp/drho)_s [m2/s2]
 * `passive_volume`: whether p V depends on the energy alone, a = 0 and b ~ rho, so that a volume which is a little wrong
   moves nothing (see `relaxation.py`)
+* `negative_energy`: whether energies may be negative, as they count from the initial state; else none is less than 0
 * `Record`: the `wp.struct` they read; `record()` fills one.
 
 Energies are specific internal energies [J/kg] that contain the chemical energy.
@@ -29,6 +30,7 @@ class EquationOfState(Protocol):
     pressure_slope: wp.Function
     sound_speed_squared: wp.Function
     passive_volume: bool
+    negative_energy: bool
 
     def record(self) -> Any:
         """The device record of this equation of state."""
@@ -37,13 +39,12 @@ class EquationOfState(Protocol):
 def evaluate(eos: EquationOfState, function: wp.Function, *numbers: float) -> float:
     """A device function of an equation of state on the host, of density [kg/m3] and perhaps energy [J/kg].
 
-    Called from Python, Warp takes a plain number for a single-precision one and mixes it with no double: there every
-    number needs its type, those in the record too.
+    Called from Python, Warp takes a `float` for a single-precision number, and mixes it with no double, no `int` and no
+    number of NumPy: every number needs its type, those in the record too.
     """
+    number = scalar if scalar is wp.float64 else float
     record = eos.record()
-    if scalar is wp.float64:
-        for name, variable in eos.Record.vars.items():
-            if variable.type is scalar:
-                setattr(record, name, scalar(getattr(record, name)))
-        return float(function(record, *map(scalar, numbers)))
-    return float(function(record, *map(float, numbers)))
+    for name, variable in eos.Record.vars.items():
+        if variable.type is scalar:
+            setattr(record, name, number(getattr(record, name)))
+    return float(function(record, *map(number, numbers)))

@@ -35,7 +35,10 @@ def sound_speed_squared(gas: IdealGasRecord, density: scalar, energy: scalar) ->
 
 @dataclass(frozen=True)
 class IdealGas:
-    """The gamma law.
+    """The gamma law, p = (gamma - 1) rho e.
+
+    Attributes:
+        gamma: above 1.
 
     Raises:
         ValueError: gamma is not a finite number above 1.
@@ -48,6 +51,7 @@ class IdealGas:
     pressure_slope = pressure_slope
     sound_speed_squared = sound_speed_squared
     passive_volume = True
+    negative_energy = False
 
     def __post_init__(self) -> None:
         """Check gamma: at 1 or below, compression would not raise the pressure of a gas with energy."""

@@ -85,13 +85,21 @@ def sound_speed_squared(jwl: JWLRecord, density: scalar, energy: scalar) -> scal
 class JWL:
     """The Jones-Wilkins-Lee equation of state; its energy is e = E / rho0, E per unit initial volume.
 
+    Attributes:
+        density: of the unburnt explosive, rho0 [kg/m3], to which V refers.
+        a: A [Pa].
+        b: B [Pa].
+        r1: R1.
+        r2: R2.
+        omega: w.
+
     Raises:
         ValueError: rho0, R1, R2 or w is not a positive finite number, or A or B not a finite one of at least 0.
     """
 
-    density: float  # rho0 [kg/m3], to which V refers
-    a: float  # A [Pa]
-    b: float  # B [Pa]
+    density: float
+    a: float
+    b: float
     r1: float
     r2: float
     omega: float
@@ -101,6 +109,7 @@ class JWL:
     pressure_slope = pressure_slope
     sound_speed_squared = sound_speed_squared
     passive_volume = False
+    negative_energy = False
 
     def __post_init__(self) -> None:
         """Check the parameters."""

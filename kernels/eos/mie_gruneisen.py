@@ -70,20 +70,27 @@ def sound_speed_squared(solid: MieGruneisenRecord, density: scalar, energy: scal
 class MieGruneisen:
     """A Mie-Gruneisen law about a Hugoniot U = c0 + s u, linear without s and G.
 
+    Attributes:
+        density: of the initial state, rho0 [kg/m3].
+        sound_speed: there, c0 [m/s].
+        slope: of the Hugoniot, s.
+        gruneisen: G, with G rho constant.
+
     Raises:
         ValueError: density or sound speed is not a positive finite number, or s or G not a finite one of at least 0.
     """
 
-    density: float  # rho0 [kg/m3]
-    sound_speed: float  # c0 [m/s]
-    slope: float = 0.0  # s
-    gruneisen: float = 0.0  # G
+    density: float
+    sound_speed: float
+    slope: float = 0.0
+    gruneisen: float = 0.0
 
     Record = MieGruneisenRecord
     pressure_offset = pressure_offset
     pressure_slope = pressure_slope
     sound_speed_squared = sound_speed_squared
     passive_volume = False
+    negative_energy = True
 
     def __post_init__(self) -> None:
         """Check the parameters."""

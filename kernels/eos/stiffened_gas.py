@@ -42,18 +42,23 @@ def sound_speed_squared(gas: StiffenedGasRecord, density: scalar, energy: scalar
 class StiffenedGas:
     """A stiffened gas. By itself it carries tension down to -p_inf; the solver lets matter in tension cavitate.
 
+    Attributes:
+        gamma: above 1.
+        stiffness: p_inf [Pa].
+
     Raises:
         ValueError: gamma is not a finite number above 1, or p_inf not a finite one of at least 0.
     """
 
     gamma: float
-    stiffness: float  # p_inf [Pa]
+    stiffness: float
 
     Record = StiffenedGasRecord
     pressure_offset = pressure_offset
     pressure_slope = pressure_slope
     sound_speed_squared = sound_speed_squared
     passive_volume = False
+    negative_energy = False
 
     def __post_init__(self) -> None:
         """Check the parameters."""
