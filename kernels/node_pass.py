@@ -33,30 +33,13 @@ class Phase:
 
 
 @wp.func
-def lies_inside(grid: Grid, lowest: wp.vec3i) -> bool:
-    """Whether all nodes of a block, the lowest given, are two or more from every face of the domain."""
+def has_no_face_near(grid: Grid, lowest: wp.vec3i, highest: wp.vec3i) -> bool:
+    """Whether all nodes between two corners, both included, are two or more from every face of the domain."""
     inside = True
     for axis in range(3):
-        if lowest[axis] < 2 or lowest[axis] + EDGE - 1 > grid.cells[axis] - 2:
+        if lowest[axis] < 2 or highest[axis] > grid.cells[axis] - 2:
             inside = False
     return inside
-
-
-@wp.func
-def has_no_face_near(grid: Grid, index: wp.vec3i) -> bool:
-    """The same of a single node."""
-    inside = True
-    for axis in range(3):
-        if index[axis] < 2 or index[axis] > grid.cells[axis] - 2:
-            inside = False
-    return inside
-
-
-@wp.func
-def row_has_no_face_near(grid: Grid, index: wp.vec3i, place: int, row: int) -> bool:
-    """The same of all nodes of a row, given one of them and its place there."""
-    begin = wp.vec3i(index[0], index[1], index[2] - place)
-    return has_no_face_near(grid, begin) and has_no_face_near(grid, begin + wp.vec3i(0, 0, row - 1))
 
 
 @wp.func
@@ -101,7 +84,7 @@ def node_kernel(
         row = nodes_at_a_time()
         if is_active(grid, block, now.step - wp.static(age)):
             lowest = lowest_node_of(grid, block)
-            if lies_inside(grid, lowest):
+            if has_no_face_near(grid, lowest, lowest + wp.vec3i(EDGE - 1, EDGE - 1, EDGE - 1)):
                 if wp.static(goes_inside):
                     corner = node_index(grid, lowest[0], lowest[1], lowest[2])
                     for n in range(thread % grid.workers * row, NODES, grid.workers * row):
@@ -113,11 +96,13 @@ def node_kernel(
                 for n in range(thread % grid.workers, NODES, grid.workers):
                     index = node_of_block(lowest, n)
                     node = node_index(grid, index[0], index[1], index[2])
-                    if row_has_no_face_near(grid, index, n % row, row):
+                    place = n % row
+                    first = index - wp.vec3i(0, 0, place)
+                    if has_no_face_near(grid, first, first + wp.vec3i(0, 0, row - 1)):
                         if wp.static(goes_inside):
-                            if n % row == 0:
+                            if place == 0:
                                 visit_row(grid, boundary, now, phase, slot, node)
-                    elif has_no_face_near(grid, index):
+                    elif has_no_face_near(grid, index, index):
                         if wp.static(goes_inside):
                             visit_one(grid, boundary, now, phase, slot, node)
                     elif on_grid(grid, index):
