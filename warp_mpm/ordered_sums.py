@@ -26,7 +26,8 @@ class OrderedSums:
         widths = [charge.half_width for charge in model.charges]
         self.bins.half_width = wp.array(widths, dtype=scalar, device=model.device)
         self.bins.count = count
-        self._bits = len(state.grid.start).bit_length() + 1  # of a bin, or of none: sorting fewer bits takes less time
+        # Bits that tell all bins, and `NOWHERE` with all its bits set, from each other: sorting fewer takes less time.
+        self._bits = len(state.grid.start).bit_length()
 
     def fill(self) -> None:
         """Put the particles into bins: after each step, and where they lie otherwise in memory."""
