@@ -102,7 +102,7 @@ def node_kernel(
                         if wp.static(goes_inside):
                             if place == 0:
                                 visit_row(grid, boundary, now, phase, slot, node)
-                    elif has_no_face_near(grid, index, index):
+                    elif row > 1 and has_no_face_near(grid, index, index):  # another of its row has
                         if wp.static(goes_inside):
                             visit_one(grid, boundary, now, phase, slot, node)
                     elif on_grid(grid, index):
