@@ -67,7 +67,7 @@ class Solver:
         yield "collect reactions", self._collect_reactions.launch
         yield "grid to particles and back", lambda: self._over_slabs(self._advance)
         if musl:
-            if self._ordered is not None:
+            if self.model.ordered:
                 yield "momentum to grid", lambda: self._over_nodes(self._reproject)
             yield "fold re-projection", lambda: self._over_nodes(self._fold_reprojected)
             yield "solve re-projection", lambda: self._over_nodes(self._solve_reprojected)
