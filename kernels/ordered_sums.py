@@ -15,6 +15,7 @@ from warp_mpm.kernels.contribution import contribution_function, force_on, momen
 from warp_mpm.kernels.precision import scalar, vector2, vector4, vector8
 from warp_mpm.kernels.records import Clock, Grid, Particles, node_index
 from warp_mpm.kernels.shape import Shape
+from warp_mpm.kernels.stencil import stencil_type
 from warp_mpm.kernels.transfer import lowest_node_function, node_offset_function, stencil_function
 
 vector10 = wp.types.vector(10, scalar)  # a node's sums and its field's
@@ -27,23 +28,40 @@ def is_within(place: wp.vec3i, width: int) -> bool:
 
 
 @functools.cache
-def given_function(shape: Shape, momentum: bool, force: bool, affine: bool) -> wp.Function:
-    """Device function: what a particle gives to the sums and the field of node (i, j, k)."""
+def sum_by_stencil(shape: Shape, value_type: type, give: wp.Function) -> wp.Function:
+    """Device function (particles, grid, bins, ambient_pressure, index) -> sum of what particles give to a node.
+
+    give(particles, grid, ambient_pressure, p, stencil, at) -> value_type, `at` the node's place in the stencil.
+    """
     width = shape.width
     stencil_of, lowest_node = stencil_function(shape), lowest_node_function(shape)
+
+    @wp.func
+    def given(
+        particles: Particles, grid: Grid, bins: Bins, ambient_pressure: scalar, p: int, index: wp.vec3i
+    ) -> value_type:
+        position = particles.position[p]
+        at = index - lowest_node(position.cell, position.fraction)
+        if not is_within(at, width):
+            return value_type()
+        half_width = bins.half_width[int(bins.charge[particles.index[p]])]
+        stencil = stencil_of(grid, position.cell, position.fraction, half_width)
+        return give(particles, grid, ambient_pressure, p, stencil, at)
+
+    return sum_function(STENCIL, value_type, given)
+
+
+@functools.cache
+def sum_scattered(shape: Shape, momentum: bool, force: bool, affine: bool) -> wp.Function:
+    """Device function (particles, grid, bins, ambient_pressure, index) -> the sums and the field of a node."""
+    record = stencil_type(shape.width)
     node_offset = node_offset_function(shape)
     contribution = contribution_function(momentum, force)
 
     @wp.func
     def given(
-        particles: Particles, grid: Grid, bins: Bins, ambient_pressure: scalar, p: int, index: wp.vec3i
+        particles: Particles, grid: Grid, ambient_pressure: scalar, p: int, stencil: record, at: wp.vec3i
     ) -> vector10:
-        position = particles.position[p]
-        cell, fraction = position.cell, position.fraction
-        at = index - lowest_node(cell, fraction)
-        if not is_within(at, width):
-            return vector10()
-        stencil = stencil_of(grid, cell, fraction, bins.half_width[int(bins.charge[particles.index[p]])])
         motion = particles.motion[p]
         give = contribution(motion.velocity, motion.mass, particles.matter[p], ambient_pressure)
         wx, wy, wz = stencil.wx[at[0]], stencil.wy[at[1]], stencil.wz[at[2]]
@@ -54,14 +72,37 @@ def given_function(shape: Shape, momentum: bool, force: bool, affine: bool) -> w
             value += (wx * stencil.sy[at[1]] * wz) * force_on(give.force_y)
             value += (wx * wy * stencil.sz[at[2]]) * force_on(give.force_z)
         if wp.static(affine and momentum):
-            offset = node_offset(grid, fraction, at[0], at[1], at[2])
+            offset = node_offset(grid, particles.position[p].fraction, at[0], at[1], at[2])
             value += momentum_on(weight * motion.mass * (particles.affine[p] * offset))
         field = weight * give.field
         return vector10(
             value[0], value[1], value[2], value[3], value[4], value[5], value[6], value[7], field[0], field[1]
         )
 
-    return given
+    return sum_by_stencil(shape, vector10, given)
+
+
+@functools.cache
+def sum_reprojected(shape: Shape, affine: bool) -> wp.Function:
+    """Device function (particles, grid, bins, ambient_pressure, index) -> the re-projected sums of a node."""
+    record = stencil_type(shape.width)
+    node_offset = node_offset_function(shape)
+
+    @wp.func
+    def given(
+        particles: Particles, grid: Grid, ambient_pressure: scalar, p: int, stencil: record, at: wp.vec3i
+    ) -> vector4:
+        motion = particles.motion[p]
+        velocity = motion.velocity
+        if wp.static(affine):
+            velocity += particles.affine[p] * node_offset(grid, particles.position[p].fraction, at[0], at[1], at[2])
+        weight = stencil.wx[at[0]] * stencil.wy[at[1]] * stencil.wz[at[2]]
+        return motion.mass * weight * reprojected(velocity)
+
+    return sum_by_stencil(shape, vector4, given)
+
+
+content_of = contribution_function(False, False)
 
 
 @wp.func
@@ -69,40 +110,14 @@ def content_given(
     particles: Particles, grid: Grid, bins: Bins, ambient_pressure: scalar, p: int, index: wp.vec3i
 ) -> vector2:
     """What a particle gives to the content of cell (i, j, k)."""
-    position = particles.position[p]
+    position, motion = particles.position[p], particles.motion[p]
     at = index - lowest_cell(position.cell, position.fraction)
     tents = tents_around(grid, position.cell, position.fraction)
-    matter = particles.matter[p]
-    volume = particles.motion[p].mass / matter.density
     weight = tents.wx[at[0]] * tents.wy[at[1]] * tents.wz[at[2]]
-    return weight * vector2(matter.pressure * volume, volume)
+    return weight * content_of(motion.velocity, motion.mass, particles.matter[p], ambient_pressure).content
 
 
-@functools.cache
-def reprojection_function(shape: Shape, affine: bool) -> wp.Function:
-    """Device function: what a particle gives to the re-projection at node (i, j, k)."""
-    width = shape.width
-    stencil_of, lowest_node = stencil_function(shape), lowest_node_function(shape)
-    node_offset = node_offset_function(shape)
-
-    @wp.func
-    def given(
-        particles: Particles, grid: Grid, bins: Bins, ambient_pressure: scalar, p: int, index: wp.vec3i
-    ) -> vector4:
-        position = particles.position[p]
-        cell, fraction = position.cell, position.fraction
-        at = index - lowest_node(cell, fraction)
-        if not is_within(at, width):
-            return vector4()
-        stencil = stencil_of(grid, cell, fraction, bins.half_width[int(bins.charge[particles.index[p]])])
-        motion = particles.motion[p]
-        velocity = motion.velocity
-        if wp.static(affine):
-            velocity += particles.affine[p] * node_offset(grid, fraction, at[0], at[1], at[2])
-        weight = stencil.wx[at[0]] * stencil.wy[at[1]] * stencil.wz[at[2]]
-        return motion.mass * weight * reprojected(velocity)
-
-    return given
+sum_content = sum_function(2, vector2, content_given)
 
 
 def _over_nodes(add: wp.Function, age: int) -> wp.Kernel:
@@ -130,8 +145,7 @@ def _over_nodes(add: wp.Function, age: int) -> wp.Kernel:
 @functools.cache
 def ordered_scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bool, content: bool) -> wp.Kernel:
     """What `scatter_kernel` of `transfer.py` adds to the nodes and cells."""
-    sum_given = sum_function(STENCIL, vector10, given_function(shape, momentum, force, affine))
-    sum_content = sum_function(2, vector2, content_given)
+    sum_given = sum_scattered(shape, momentum, force, affine)
 
     @wp.func
     def add(particles: Particles, grid: Grid, bins: Bins, ambient_pressure: scalar, index: wp.vec3i):
@@ -149,7 +163,7 @@ def ordered_scatter_kernel(shape: Shape, momentum: bool, force: bool, affine: bo
 @functools.cache
 def ordered_reprojection_kernel(shape: Shape, affine: bool) -> wp.Kernel:
     """What `advance_kernel` of `transfer.py` adds to the re-projection."""
-    sum_given = sum_function(STENCIL, vector4, reprojection_function(shape, affine))
+    sum_given = sum_reprojected(shape, affine)
 
     @wp.func
     def add(particles: Particles, grid: Grid, bins: Bins, ambient_pressure: scalar, index: wp.vec3i):

@@ -144,7 +144,7 @@ def find_material(name: str, **choices: Any) -> Material:
     if not known:
         raise mistake("material", expected, repr(name), closest_match(name, NAMES))
     allowed = CHOICES if known in _EXPLOSIVES else ()
-    for other in choices.keys() - allowed:
+    for other in sorted(choices.keys() - allowed):
         remedy = "a material of your own is made by explosive(...) or inert(...)"
         raise mistake(known, f"no choice but {', '.join(allowed)}" if allowed else "no choices", other, remedy)
     return {**_EXPLOSIVES, **_INERT}[known](**choices)
