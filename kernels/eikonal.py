@@ -131,7 +131,7 @@ def look_around(nodes: Nodes):
         near = node_near(nodes, cell, neighbour, medium)
         if near >= 0 and nodes.certain[wp.max(near, 0)] == 0:
             return
-    nodes.certain[n] = 2
+    wp.atomic_max(nodes.certain, n, 2)  # while others ask whether it is 0
 
 
 @wp.kernel(enable_backward=False)

@@ -140,12 +140,14 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
         raise_maximum(phase.peaks, slot, solve_one(grid, boundary.gravity, phase.strength, n))
 
     @wp.func
-    def forget(grid: Grid, n: int):
+    def forget(grid: Grid, boundary: Boundary, index: wp.vec3i):
         """A node that no particle reaches any more: neighbours may still look at it, a wall's fold at a ghost.
 
-        The start of such a ghost its owner may write at the same time, but nobody reads it before it is written anew.
+        A ghost's start is its owner's, who may write it at the same time; nobody reads it before.
         """
-        grid.start[n] = vector8()
+        n = node_index(grid, index[0], index[1], index[2])
+        if is_owner(boundary, grid.cells, index):
+            grid.start[n] = vector8()
         if wp.static(reprojects):
             grid.reprojected[n] = vector4()
 

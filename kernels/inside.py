@@ -44,7 +44,7 @@ _SOLVE = """
         write_four(grid.reprojected.data + n, reprojected);
     const number mass = sums[3];
     const auto pushed = (mass == 0) & ((sums[4] != 0) | (sums[5] != 0) | (sums[6] != 0));
-    if (any(pushed)) {  // linear shapes push at nodes where they have no weight
+    if (any(pushed)) {  // linear shapes, not sharpened, push where they have no weight
         for (int lane = 4; lane < 7; ++lane)
             sums[lane] = choose(pushed, none, sums[lane]);
         write_eight(grid.sums.data + n, sums);

@@ -71,8 +71,8 @@ def node_kernel(
     (i, j, k); visit_row and visit_one(grid, boundary, now, phase, slot, n) for rows (see `node_rows.py`) and nodes that
     have no face near, n the flat index of the first; without them there is nothing to do for these. `look_ahead(grid,
     n)` asks for a row of the next block, n its first node: thin gas keeps a pass waiting for memory, and row by row a
-    CPU does both, waits and works; a whole block's rows asked for at once are too many for it. `retire(grid, n)` is for
-    nodes of blocks that were last scattered to a step before that.
+    CPU does both, waits and works; a whole block's rows asked for at once are too many for it. `retire(grid,
+    boundary, index)` is for nodes of blocks that were last scattered to a step before that.
     """
     goes_inside, looks_ahead, retires = visit_row is not None, look_ahead is not None, retire is not None
 
@@ -113,6 +113,6 @@ def node_kernel(
                 for n in range(thread % grid.workers, NODES, grid.workers):
                     index = node_of_block(lowest, n)
                     if on_grid(grid, index):
-                        retire(grid, node_index(grid, index[0], index[1], index[2]))
+                        retire(grid, boundary, index)
 
     return over_nodes
