@@ -17,7 +17,17 @@ import warp as wp
 from warp_mpm.kernels.content import FILLING, PRESSURE, inside
 from warp_mpm.kernels.motion import Faces, place, report_fault, settle
 from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
-from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Clock, Grid, Maxima, Particles, raise_maxima
+from warp_mpm.kernels.records import (
+    AMBIENT_WORK,
+    CLAMPED_ENERGY,
+    TALLIES,
+    Clock,
+    Grid,
+    Maxima,
+    Particles,
+    raise_maxima,
+    tally_row,
+)
 from warp_mpm.kernels.relaxation import ACTIVE_EQUALISATION, PASSIVE_EQUALISATION, gas_share, relax_density, yielding
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
@@ -287,11 +297,12 @@ def update_kernel(
             particles.motion[p] = motion
         if ambient_pressure != ZERO:
             work = wp.float64(ambient_pressure * dt * step.work_divergence) * wp.float64(mass / matter.density)
-            wp.atomic_add(tallies, slab * TALLIES + AMBIENT_WORK, work)
+            wp.atomic_add(tallies, tally_row(tallies, slab, p) * TALLIES + AMBIENT_WORK, work)
         energy = matter.energy + gained
         if wp.static(not eos.negative_energy):
             if energy < ZERO:
-                wp.atomic_add(tallies, slab * TALLIES + CLAMPED_ENERGY, -wp.float64(energy) * wp.float64(mass))
+                clamped = -wp.float64(energy) * wp.float64(mass)
+                wp.atomic_add(tallies, tally_row(tallies, slab, p) * TALLIES + CLAMPED_ENERGY, clamped)
                 energy = ZERO
 
         # Density follows the strain, and inside the material relaxes to the room, and the pressure, around it.

@@ -16,6 +16,7 @@ from warp_mpm.kernels.records import (
     Particles,
     Position,
     raise_maxima,
+    tally_row,
 )
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.transfer import displacement_function
@@ -44,10 +45,10 @@ def face_crossed(cell: wp.vec3i, cells: wp.vec3i, faces: Faces) -> int:
 
 @wp.func
 def tally_outflow(
-    mass: scalar, velocity: vector3, energy: scalar, face: int, slab: int, tallies: wp.array(dtype=wp.float64)
+    mass: scalar, velocity: vector3, energy: scalar, face: int, row: int, tallies: wp.array(dtype=wp.float64)
 ):
     """Add the mass, momentum and energy of a particle that leaves to the tallies of its face."""
-    lane = slab * TALLIES + face * OUTFLOW_LANES + OUTFLOW_MASS
+    lane = row * TALLIES + face * OUTFLOW_LANES + OUTFLOW_MASS
     specific = wp.float64(energy) + wp.float64(HALF) * wp.float64(wp.dot(velocity, velocity))
     wp.atomic_add(tallies, lane, wp.float64(mass))
     for axis in range(3):
@@ -135,7 +136,7 @@ def settle(
         report_fault(particles, p, slab, faults)
         return True
     if after.left_through >= 0:
-        tally_outflow(mass, velocity, energy, after.left_through, slab, tallies)
+        tally_outflow(mass, velocity, energy, after.left_through, tally_row(tallies, slab, p), tallies)
         particles.motion[p].mass = ZERO
         particles.matter[p].pressure = ZERO
         particles.matter[p].viscous_pressure = ZERO

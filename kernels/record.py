@@ -14,17 +14,6 @@ RECORD_HEAD = 3  # lanes
 
 
 @wp.func
-def highest_in_region(grid: Grid, nodes: wp.array(dtype=int), begin: int, end: int) -> scalar:
-    """Highest field pressure of the listed nodes that are at least half filled [Pa]."""
-    peak = ZERO
-    for n in range(begin, end):
-        node = nodes[n]
-        if filling_of(grid, node) >= HALF:
-            peak = wp.max(peak, grid.field[node][0])
-    return peak
-
-
-@wp.func
 def interpolate(grid: Grid, node: int, f: vector3) -> scalar:
     """Trilinear field pressure at the fraction f of the cell above a node [Pa]."""
     pressure = ZERO
@@ -45,17 +34,22 @@ def record_step(
     slots: int,
     peaks: wp.array(dtype=scalar),
     region_nodes: wp.array(dtype=int),
-    region_begin: wp.array(dtype=int),
+    region_lanes: wp.array(dtype=int),
+    line_lane: int,
     line_nodes: wp.array(dtype=int),
     line_fractions: wp.array(dtype=vector3),
     times: wp.array(dtype=wp.float64),
     rows: wp.array2d(dtype=scalar),
     row_offset: int,
 ):
-    """Write one row of the record; thread 0 its head, the others a region or a point of the line each."""
+    """Write one row of the record, until then 0: thread 0 its head, the others a point of the line or a node each.
+
+    The nodes are those of regions: of those at least half filled the highest field pressure is kept. They have a thread
+    each, for one that went through a whole region would take longer than a step of a GPU.
+    """
     thread = wp.tid()
     row = clock[0].step - row_offset
-    regions = region_begin.shape[0] - 1
+    points = line_nodes.shape[0]
     if thread == 0:
         times[row] = clock[0].time
         particle_pressure = ZERO
@@ -68,14 +62,17 @@ def record_step(
         rows[row, RECORD_DT] = clock[0].dt
         rows[row, RECORD_PARTICLE_PRESSURE] = particle_pressure
         rows[row, RECORD_FIELD_PRESSURE] = field_pressure
-    elif thread <= regions:
-        region = thread - 1
-        rows[row, RECORD_HEAD + region] = highest_in_region(
-            grid, region_nodes, region_begin[region], region_begin[region + 1]
-        )
+    elif thread <= points:
+        point = thread - 1
+        rows[row, line_lane + point] = interpolate(grid, line_nodes[point], line_fractions[point])
     else:
-        point = thread - 1 - regions
-        rows[row, RECORD_HEAD + regions + point] = interpolate(grid, line_nodes[point], line_fractions[point])
+        n = thread - 1 - points
+        node = region_nodes[n]
+        lane = region_lanes[n]
+        pressure = grid.field[node][0]
+        if pressure > rows[row, lane]:  # most are lower than one before
+            if filling_of(grid, node) >= HALF:
+                wp.atomic_max(rows, row, lane, pressure)
 
 
 @wp.kernel(enable_backward=False)

@@ -115,12 +115,27 @@ STRAIN_RATE = wp.constant(4)  # |div v| [1/s]
 DISPLACEMENT = wp.constant(5)  # in the latest step [cells]
 PARTICLE_PRESSURE = wp.constant(6)  # [Pa]; the last lane is free
 
-# What particle kernels tally, one row of double lanes for each slab.
+# What particle kernels tally, in rows of double lanes: one for each slab, or on a GPU some for all (see `tally_row`).
 OUTFLOW_MASS = wp.constant(0)  # for each face: mass [kg], momentum (3) [kg m/s], energy [J]
 OUTFLOW_LANES = wp.constant(5)
 CLAMPED_ENERGY = wp.constant(30)  # added where an energy would have become negative [J]
 AMBIENT_WORK = wp.constant(31)  # done by the material on the ambient pressure [J]
 TALLIES = 32  # lanes
+
+
+@wp.func_native(f"""
+#if defined(__CUDA_ARCH__)
+    return p % (tallies.shape[0] / {TALLIES});
+#else
+    return slab;
+#endif
+""")
+def tally_row(tallies: wp.array(dtype=wp.float64), slab: int, p: int) -> int:
+    """The row for a particle: its slab's, which has one thread; on a GPU another than its neighbours have.
+
+    Threads that add to one number wait for each other, and each of them adds its work on an ambient pressure.
+    """
+    ...
 
 
 @wp.func

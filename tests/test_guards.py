@@ -158,6 +158,6 @@ def test_the_memory_that_a_state_needs_is_what_it_takes(order, transfer, materia
     taken = sum(
         array.size * wp.types.type_size_in_bytes(array.dtype)
         for array in arrays
-        if isinstance(array, wp.array) and array.size >= state.count
+        if isinstance(array, wp.array) and array.size >= state.count and array is not state.tallies
     )
     assert taken == pytest.approx(memory_needed(model), abs=64)

@@ -55,12 +55,14 @@ class Recorder:
         device = state.device
         self._regions = len(regions)
         self._points = len(points)
-        flat = np.concatenate([np.zeros(1, np.int64), *(_flat(scene.domain, nodes) for nodes in regions)])
-        begins = 1 + np.concatenate([[0], np.cumsum([len(nodes) for nodes in regions])])
+        flat = np.concatenate([np.zeros(0, np.int64), *(_flat(scene.domain, nodes) for nodes in regions)])
+        region_lanes = RECORD_HEAD + np.repeat(np.arange(len(regions)), [len(nodes) for nodes in regions])
+        self._threads = 1 + len(points) + len(flat)
         self._inputs = [
             *(state.grid, state.clock, state.model.slab_count, state.maxima, state.slots, state.peaks),
             wp.array(flat.astype(np.int32), dtype=int, device=device),
-            wp.array(begins.astype(np.int32), dtype=int, device=device),
+            wp.array(region_lanes.astype(np.int32), dtype=int, device=device),
+            RECORD_HEAD + len(regions),
             wp.array(_flat(scene.domain, cell).astype(np.int32), dtype=int, device=device),
             wp.array(fraction, dtype=vector3, device=device),
         ]
@@ -88,7 +90,7 @@ class Recorder:
         if self._pending == CHUNK:
             self._fetch()
         inputs = [*self._inputs, self._times, self._rows, self._first_step]
-        wp.launch(record_step, 1 + self._regions + self._points, inputs=inputs, device=self._state.device)
+        wp.launch(record_step, self._threads, inputs=inputs, device=self._state.device)
         if self._gauges:
             self._record_gauges()
         self._section.record()
@@ -191,6 +193,7 @@ class Recorder:
         if self._pending:
             count = self._pending
             self._fetched.append((self._times.numpy()[:count].copy(), self._rows.numpy()[:count].copy()))
+            self._rows.zero_()
             self._first_step += count
             self._pending = 0
 

@@ -25,6 +25,7 @@ from warp_mpm.ordered_sums import OrderedSums
 from warp_mpm.state import State
 
 THIN = 0.5  # nodes of active blocks to a particle from which on asking ahead pays; in a dense gas there are 0.2
+AUDIT_THREADS = 1 << 15  # on a GPU: enough to keep all of it busy
 STEPS_BETWEEN_SORTS = 20  # neighbours in memory stay neighbours on the grid for about as long
 
 
@@ -120,15 +121,16 @@ class Solver:
     def audit(self) -> tuple[np.ndarray, float]:
         """Sums over the particles (`kernels.reduce` names the lanes), and the mass on the grid [kg]."""
         state, model = self.state, self.model
-        sums = wp.zeros(model.slab_count * reduce.AUDIT, dtype=wp.float64, device=model.device)
-        for slab, charge, begin, count in self._groups():
+        threads = AUDIT_THREADS if model.device.is_cuda else 1
+        sums = wp.zeros(threads, dtype=reduce.AuditRow, device=model.device)
+        for _, charge, begin, count in self._groups():
             energy = charge.material.specific_energy if charge.burn_class is not None else 0.0
-            inputs = [state.particles, state.grid.spacing, energy, sums, slab, begin]
-            wp.launch(reduce.audit_particles, count, inputs=inputs, device=model.device)
-        grid_mass = wp.zeros(1, dtype=wp.float64, device=model.device)
-        inputs = [state.grid, model.boundary, state.clock, grid_mass]
-        wp.launch(reduce.audit_grid, state.blocks * state.grid.workers, inputs=inputs, device=model.device)
-        return sums.numpy().reshape(model.slab_count, reduce.AUDIT).sum(axis=0), float(grid_mass.numpy()[0])
+            inputs = [state.particles, state.grid.spacing, energy, sums, threads, begin, count]
+            wp.launch(reduce.audit_particles, threads, inputs=inputs, device=model.device)
+        grid_mass = wp.zeros(threads, dtype=wp.float64, device=model.device)
+        inputs = [state.grid, model.boundary, state.clock, grid_mass, threads]
+        wp.launch(reduce.audit_grid, threads, inputs=inputs, device=model.device)
+        return sums.numpy().sum(axis=0), float(grid_mass.numpy().sum())
 
     def _initialise(self) -> None:
         """Pressures and rates at the start, and the first scatter."""

@@ -28,6 +28,7 @@ from warp_mpm.launch import Launcher
 from warp_mpm.model import Model
 from warp_mpm.places import recorded_places
 
+TALLY_ROWS = 1024  # on a GPU
 GRID_SLOTS = 16  # pieces into which the work on nodes is cut on a CPU: more, and late gas is shared more evenly
 CACHE_LINE = 64  # [bytes]; a node's eight lanes never lie in two
 NO_STEP = -2  # a stamp that no step has
@@ -62,7 +63,8 @@ class State:
         self.particles = _place_particles(model)
         self.clock = _start_clock(model)
         self.maxima = wp.zeros(model.slab_count, dtype=Maxima, device=self.device)
-        self.tallies = wp.zeros(model.slab_count * TALLIES, dtype=wp.float64, device=self.device)
+        rows = TALLY_ROWS if model.device.is_cuda else model.slab_count
+        self.tallies = wp.zeros(rows * TALLIES, dtype=wp.float64, device=self.device)
         self.faults = wp.zeros(model.slab_count, dtype=int, device=self.device)
         self.reactions = wp.zeros(self.slots * REACTIONS, dtype=wp.float64, device=self.device)
         self.pending_impulses = wp.zeros_like(self.reactions)
