@@ -11,7 +11,7 @@ from pxr import Usd
 
 from warp_mpm.cli import main
 
-RUN = ("run", "two_point", "--set", "cell_size=2e-2", "--frames", "5", "--checkpoint-steps", "20")
+RUN = ("run", "two_point", "--set", "cell_size=2e-2", "--frames", "5", "--checkpoint-steps", "20", "--device", "cpu")
 ROOM = {  # of which the run, which needs about 900 kB, leaves nothing for its [kB]
     "first file": 4,
     "first frame": 40,

@@ -119,6 +119,7 @@ class _Run:
         )
         self.begin = time.perf_counter()  # [s]; of a resumed run, as if it had gone on all the time
         self.launcher = Launcher(find_device(device), threads)
+        self.steps_at_once = STEPS_AT_ONCE if self.launcher.device.is_cuda else 1
         self.output = None if output is None else directory_for(scene.name, checks.as_path("simulate: output", output))
         self.model = build_model(scene, config, self.launcher.device)
         check_memory(self.model)
@@ -196,7 +197,8 @@ class _Run:
             self.steps += 1
         clock = self.state.clock_values()
         check_state(self.state, self.steps)
-        self.solver.sort_if_due()
+        if self.steps % self.steps_at_once == 0:
+            self.solver.sort_if_due()
         if self.steps - self.audited_step >= STEPS_BETWEEN_AUDITS:
             self._audit()
         self.solver_seconds += time.perf_counter() - begin
@@ -205,12 +207,13 @@ class _Run:
     def _safe_steps(self, left: float, dt: float) -> int:
         """Steps that surely end before an instant that is `left` seconds away, then at least one.
 
-        On a CPU looking at the clock costs nothing. On a GPU it waits for all work, so several steps go out at once.
+        On a CPU looking at the clock costs nothing. On a GPU it waits for all work, so several steps go out at once,
+        up to the next that may sort the particles: which those are does not depend on frames, nor on a stop.
         """
-        if not self.launcher.device.is_cuda or dt <= 0.0:
+        if self.steps_at_once == 1 or dt <= 0.0:
             return 1
         surely = math.floor(math.log1p((GROWTH - 1.0) * left / (GROWTH * dt)) / math.log(GROWTH))
-        return max(1, min(surely, STEPS_AT_ONCE))
+        return max(1, min(surely, self.steps_at_once - self.steps % self.steps_at_once))
 
     def _instants_to_come(self) -> list[float]:
         """The next frame's and the next picture's [s]."""
