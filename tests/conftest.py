@@ -1,11 +1,14 @@
 """What all tests share."""
 
+import pretend_gpu
 import pytest
 import warp as wp
 from hypothesis import HealthCheck, Phase, settings
 
 from warp_mpm.warp_startup import start_quietly
 
+if pretend_gpu.wanted():
+    pretend_gpu.install()
 start_quietly()
 pytest.register_assert_rewrite("usd_checks")  # so that its assertions, too, say what they found
 
