@@ -48,6 +48,11 @@ def raise_if_higher(values: wp.array(dtype=float), total: wp.array(dtype=float))
         wp.atomic_max(total, 0, value)
 
 
+@wp.kernel(enable_backward=False)
+def read_past_the_end(values: wp.array(dtype=float), total: wp.array(dtype=float)):
+    wp.atomic_add(total, 0, values[wp.tid() + 1])
+
+
 @wp.func_native("return ((const float4*)(values.data + i))->x;")
 def first_of_four(values: wp.array(dtype=float), i: int) -> float: ...
 
@@ -82,6 +87,7 @@ def test_what_is_right(kernel, total):
         (shift, "writes what thread .* reads|reads what thread .* writes"),
         (read_a_sum_too_soon, "reads what thread .* adds to|adds to what thread .* reads"),
         (read_four, "not aligned"),
+        (read_past_the_end, "reads memory that is in no array"),
     ],
 )
 def test_what_is_wrong(kernel, fault):
@@ -92,7 +98,7 @@ def test_what_is_wrong(kernel, fault):
 def test_memory_of_the_host():
     values = np.ones(1 << 20, dtype=np.float32)
     foreign = wp.array(ptr=values.ctypes.data, dtype=float, shape=values.shape, device=GPU)
-    with pytest.raises(RuntimeError, match="reads memory that is not the device's"):
+    with pytest.raises(RuntimeError, match="reads memory that is in no array"):
         launch(sum_atomically, foreign)
 
 

@@ -5,7 +5,7 @@ for a real one; below that, the source is compiled for the CPU and its threads r
 order. What would go wrong on a GPU is an error, or crashes:
 
 - two threads of a launch that touch the same memory, unless both read it, add to it atomically, or raise it;
-- an address that is not aligned as the hardware needs it, or that is not the device's;
+- an address that is not aligned as the hardware needs it, or that is in no array of the device;
 - a host that reads the device's memory, and anything that reads memory after it was freed (a segmentation fault);
 - a copy from or to the host while a graph is captured;
 - numbers that nobody wrote, which are NaN, and answers that depend on the order of threads.

@@ -232,7 +232,7 @@ class Driver:
         access = ACCESSES[fault.access]
         where = self.memory.whose(fault.address)
         if fault.kind == FOREIGN:
-            return f"thread {fault.thread - 1} {access} memory that is not the device's"
+            return f"thread {fault.thread - 1} {access} memory that is in no array of the device"
         if fault.kind == MISALIGNED:
             return f"thread {fault.thread - 1} uses an address that is not aligned, at {where}"
         other = (

@@ -6,7 +6,8 @@ import mmap
 CAPACITY = 8 << 30  # bytes of addresses; memory is taken where it is touched
 PAGE = mmap.PAGESIZE
 ALIGNMENT = 256  # bytes, as CUDA's
-WORD = 16  # bytes that the detector keeps for four of memory
+WORD = 16  # bytes that the detector keeps for four of memory: all 0 where there is no array
+NOBODY_YET = 0x01  # as every byte of them
 NOT_A_NUMBER = 0xFF  # as every byte
 
 NOTHING, EVERYTHING = 0, mmap.PROT_READ | mmap.PROT_WRITE
@@ -50,13 +51,16 @@ class DeviceMemory:
         self.sizes[address] = size
         _libc.mprotect(at, room - PAGE, EVERYTHING)
         ctypes.memset(address, NOT_A_NUMBER, size)
+        self._mark(address, size, NOBODY_YET)
         if not self._open:
             _libc.mprotect(at, room - PAGE, NOTHING)
         return address
 
     def release(self, address: int) -> None:
         """Give memory back; it is used again only when there is no other, so that late readers are caught."""
-        at, room = address // PAGE * PAGE, _pages(self.sizes.pop(address)) + PAGE
+        size = self.sizes.pop(address)
+        self._mark(address, size, 0)
+        at, room = address // PAGE * PAGE, _pages(size) + PAGE
         _libc.madvise(at, room, FORGET)
         _libc.mprotect(at, room, NOTHING)
         self._free.append((at, room))
@@ -77,6 +81,9 @@ class DeviceMemory:
         self._open -= 1
         if self._open == 0:
             self._protect(NOTHING)
+
+    def _mark(self, address: int, size: int, value: int) -> None:
+        ctypes.memset(self.words + (address - self.begin) // 4 * WORD, value, -(-size // 4) * WORD)
 
     def _protect(self, how: int) -> None:
         for address, size in self.sizes.items():

@@ -15,7 +15,7 @@ namespace pretend_gpu {
 enum Access : unsigned { READ = 1, WRITE, ADD, RAISE };
 enum Kind { CONFLICT = 1, FOREIGN, MISALIGNED };
 
-struct Word {  // of device memory: who touched it last, and in which launch
+struct Word {  // of device memory: who touched it last, and in which launch; no launch, and it is of no array
     unsigned launch, thread, access;
     unsigned readers;  // the thread that has read it in this launch, or SEVERAL
 };
@@ -91,6 +91,8 @@ PLAIN static void touch(void* at, unsigned long long bytes, unsigned access)
             blame(FOREIGN, access, 0, 0, (unsigned long long)at);
         return;
     }
+    if (!device->words[offset / 4].launch || !device->words[(offset + bytes - 1) / 4].launch)
+        blame(FOREIGN, access, 0, 0, (unsigned long long)at);
     if (bytes < 4)
         return;
     for (unsigned long long n = 0; n < bytes; n += 4)
