@@ -51,17 +51,16 @@ class DeviceMemory:
         self.sizes[address] = size
         _libc.mprotect(at, room - PAGE, EVERYTHING)
         ctypes.memset(address, NOT_A_NUMBER, size)
-        self._mark(address, size, NOBODY_YET)
+        ctypes.memset(self._words_of(address), NOBODY_YET, -(-size // 4) * WORD)
         if not self._open:
             _libc.mprotect(at, room - PAGE, NOTHING)
         return address
 
     def release(self, address: int) -> None:
         """Give memory back; it is used again only when there is no other, so that late readers are caught."""
-        size = self.sizes.pop(address)
-        self._mark(address, size, 0)
-        at, room = address // PAGE * PAGE, _pages(size) + PAGE
+        at, room = address // PAGE * PAGE, _pages(self.sizes.pop(address)) + PAGE
         _libc.madvise(at, room, FORGET)
+        _libc.madvise(self._words_of(at), room // 4 * WORD, FORGET)
         _libc.mprotect(at, room, NOTHING)
         self._free.append((at, room))
 
@@ -82,8 +81,8 @@ class DeviceMemory:
         if self._open == 0:
             self._protect(NOTHING)
 
-    def _mark(self, address: int, size: int, value: int) -> None:
-        ctypes.memset(self.words + (address - self.begin) // 4 * WORD, value, -(-size // 4) * WORD)
+    def _words_of(self, address: int) -> int:
+        return self.words + (address - self.begin) // 4 * WORD
 
     def _protect(self, how: int) -> None:
         for address, size in self.sizes.items():
