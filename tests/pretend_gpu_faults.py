@@ -1,5 +1,6 @@
 """What the pretend GPU must notice; `test_pretend_gpu.py` runs these in a process that has one."""
 
+import functools
 import signal
 import subprocess
 import sys
@@ -53,6 +54,47 @@ def read_past_the_end(values: wp.array(dtype=float), total: wp.array(dtype=float
     wp.atomic_add(total, 0, values[wp.tid() + 1])
 
 
+@functools.cache
+def write_differently(dtype):
+    """Kernel whose threads write other values of a type to one place."""
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def write_last(values: wp.array(dtype=dtype), total: wp.array(dtype=dtype)):
+        total[0] = values[wp.tid()]
+
+    return write_last
+
+
+@functools.cache
+def add_plainly(dtype):
+    """Kernel whose threads add values of a type to one place, but not atomically."""
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def add_last(values: wp.array(dtype=dtype), total: wp.array(dtype=dtype)):
+        total[0] = total[0] + values[wp.tid()]
+
+    return add_last
+
+
+@functools.cache
+def double_the_next(dtype):
+    """Kernel whose threads read values of a type, the last one past the end."""
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def double_next(values: wp.array(dtype=dtype), total: wp.array(dtype=dtype)):
+        total[wp.tid()] = values[wp.tid() + 1] * 2.0
+
+    return double_next
+
+
+@wp.kernel(enable_backward=False)
+def add_and_read(values: wp.array(dtype=float), total: wp.array(dtype=float)):
+    i = wp.tid()
+    wp.atomic_add(total, 0, 1.0)
+    if i == 1:
+        values[0] = total[0]
+
+
 @wp.func_native("return ((const float4*)(values.data + i))->x;")
 def first_of_four(values: wp.array(dtype=float), i: int) -> float: ...
 
@@ -93,6 +135,26 @@ def test_what_is_right(kernel, total):
 def test_what_is_wrong(kernel, fault):
     with pytest.raises(RuntimeError, match=rf"pretend GPU: {kernel.key}.*: thread \d+ .*({fault})"):
         launch(kernel)
+
+
+@pytest.mark.parametrize("dtype", [float, wp.vec2, wp.vec3, wp.vec4, wp.types.vector(8, wp.float32)])
+@pytest.mark.parametrize(
+    ("make", "fault", "room"),
+    [(write_differently, "writes", 1), (add_plainly, "writes|reads", 1), (double_the_next, "is in no array", COUNT)],
+)
+def test_numbers_of_any_length_are_watched(make, fault, room, dtype):
+    count = COUNT - 1  # so that there is no page's end behind the last one, but what lies before it
+    numbers = np.random.default_rng(1).random((count, wp.types.type_size(dtype))).astype(np.float32)
+    values = wp.array(numbers.squeeze(), dtype=dtype, device=GPU)
+    with pytest.raises(RuntimeError, match=rf"pretend GPU: .*thread \d+ .*({fault})"):
+        wp.launch(make(dtype), count, inputs=[values, wp.zeros(room, dtype=dtype, device=GPU)], device=GPU)
+
+
+@pytest.mark.parametrize("launches", range(10))
+def test_who_added_last_may_not_read_what_others_add(launches):
+    """In whatever order they come."""
+    with pytest.raises(RuntimeError, match=r"adds to"):
+        wp.launch(add_and_read, 2, inputs=[wp.zeros(1, dtype=float, device=GPU) for _ in range(2)], device=GPU)
 
 
 def test_memory_of_the_host():

@@ -6,11 +6,13 @@ import sys
 from pathlib import Path
 
 import pretend_gpu
+import pytest
 
 TESTS = Path(__file__).parent
 SELECTED = ("pretend_gpu_faults.py", "test_same_answer.py::test_a_gpu_gives_the_answer_of_the_cpu_and_its_own_again")
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="its memory is Linux's")
 def test_on_a_pretend_gpu():
     """What it must notice, and one run of the solver; none is skipped."""
     done = subprocess.run(

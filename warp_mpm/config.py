@@ -53,7 +53,7 @@ class SolverConfig:
         burn_width: width of the burn zone [cells]; None: the scene's, else 0.5.
         viscosity: quadratic and linear coefficient of the artificial viscosity.
         cfl: Courant number of the time step.
-        reproducible: on a GPU, the same answer, bit for bit, on every run, for more time; a CPU's always is.
+        reproducible: on a GPU, the same particles and fields, bit for bit, on every run, for more time.
     """
 
     shape: ShapeFunction = ShapeFunction.BSPLINE

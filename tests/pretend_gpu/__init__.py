@@ -1,4 +1,4 @@
-"""A GPU played by the CPU, for machines that have none: `WARP_MPM_PRETEND_GPU=1 pytest -k cuda`.
+"""A GPU played by the CPU, for machines that have none: `WARP_MPM_PRETEND_GPU=1 pytest -k cuda:0`.
 
 Warp believes that there is a device `cuda:0`. It generates CUDA source for it, records graphs and copies memory, all as
 for a real one; below that, the source is compiled for the CPU and its threads run one after the other, blocks in random
@@ -11,11 +11,14 @@ order. What would go wrong on a GPU is an error, or crashes:
 - numbers that nobody wrote, which are NaN, and answers that depend on the order of threads.
 
 What it cannot tell is how fast a GPU is, whether NVIDIA's compiler accepts the source (`test_cuda_compiles.py` does),
-and whether copies and kernels overlap as they should: it has one stream, on which everything is done at once.
+and whether copies and kernels overlap as they should: it has one stream, on which everything is done at once. Warp's
+own functions are those for the CPU, and rounding is the CPU's. A thread that reads and then writes a number counts as
+one that writes it, and numbers of less than four bytes are not watched. It needs Linux.
 """
 
 import hashlib
 import os
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -34,7 +37,13 @@ def wanted() -> bool:
 
 
 def install() -> None:
-    """Make Warp find it; before Warp starts."""
+    """Make Warp find it; before Warp starts.
+
+    Raises:
+        OSError: this is not Linux.
+    """
+    if sys.platform != "linux":
+        raise OSError(f"{VARIABLE}: expected Linux, got {sys.platform}")
     from warp._src import build, context
 
     from pretend_gpu.driver import CONSTANTS, Driver

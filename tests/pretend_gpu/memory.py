@@ -20,6 +20,15 @@ _libc.mmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ct
 _libc.mprotect.argtypes = _libc.madvise.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int]
 
 
+def _checked(result: int, function: object, arguments: tuple) -> int:
+    if result in (-1, ctypes.c_void_p(-1).value):
+        raise OSError(ctypes.get_errno(), f"pretend GPU: the system refuses memory: {arguments}")
+    return result
+
+
+_libc.mmap.errcheck = _libc.mprotect.errcheck = _libc.madvise.errcheck = _checked
+
+
 class DeviceMemory:
     """Allocations end where a page ends, and behind each is a page that nobody may touch.
 

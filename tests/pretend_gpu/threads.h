@@ -16,7 +16,7 @@ enum Access : unsigned { READ = 1, WRITE, ADD, RAISE };
 enum Kind { CONFLICT = 1, FOREIGN, MISALIGNED };
 
 struct Word {  // of device memory: who touched it last, and in which launch; no launch, and it is of no array
-    unsigned launch, thread, access;
+    unsigned launch, thread, access;  // or SEVERAL threads, all of which add, or raise
     unsigned readers;  // the thread that has read it in this launch, or SEVERAL
 };
 struct Fault {
@@ -29,18 +29,16 @@ struct Device {
     Fault fault;  // the first
     unsigned launch;
 };
-struct Doubt {  // a write where another thread has written: a conflict if it changes the word
-    unsigned* word;
-    unsigned value;
-};
-
 static const unsigned NOBODY = 0, SEVERAL = 0xFFFFFFFF;
 static const int MOST_DOUBTS = 4096;
-static Device* device;
-static unsigned thread, atomic_access;
-static unsigned long long stack;
-static Doubt doubts[MOST_DOUBTS];
-static int doubt_count;
+// Volatile, for the calls that read and write them are put in after the compiler has optimised what is around them.
+static Device* volatile device;
+static volatile unsigned thread, atomic_access;
+static volatile unsigned long long stack;
+// Writes where another thread has written: conflicts if they change the word.
+static unsigned* volatile doubted[MOST_DOUBTS];
+static volatile unsigned value_before[MOST_DOUBTS];
+static volatile int doubt_count;
 
 PLAIN static void blame(unsigned kind, unsigned access, unsigned other_access, unsigned other, unsigned long long at)
 {
@@ -62,9 +60,11 @@ PLAIN static void touch_word(unsigned access, unsigned long long offset)
     if (word.launch != device->launch)
         word = { device->launch, NOBODY, 0, NOBODY };
     const bool touched = word.thread != NOBODY && word.thread != thread;
-    if (touched && access == WRITE && word.access == WRITE && doubt_count < MOST_DOUBTS)
-        doubts[doubt_count++] = { place, *place };
-    else if (touched && !excused(access, word.access))
+    if (touched && access == WRITE && word.access == WRITE && doubt_count < MOST_DOUBTS) {
+        doubted[doubt_count] = place;
+        value_before[doubt_count] = *place;
+        doubt_count = doubt_count + 1;
+    } else if (touched && !excused(access, word.access))
         blame(CONFLICT, access, word.access, word.thread, (unsigned long long)place);
     if (access == READ) {
         word.readers = word.readers == NOBODY || word.readers == thread ? thread : SEVERAL;
@@ -73,7 +73,7 @@ PLAIN static void touch_word(unsigned access, unsigned long long offset)
     if (word.readers != NOBODY && word.readers != thread && !excused(access, READ))
         blame(CONFLICT, access, READ, word.readers, (unsigned long long)place);
     const bool written_before = word.thread == thread && word.access == WRITE;
-    word.thread = thread;
+    word.thread = touched && access != WRITE && access == word.access ? SEVERAL : thread;
     word.access = written_before ? WRITE : access;
 }
 
@@ -86,8 +86,8 @@ PLAIN static void touch(void* at, unsigned long long bytes, unsigned access)
 {
     const unsigned long long offset = (unsigned long long)at - device->memory;
     if (offset >= device->size) {
-        const bool own = near(at, (void*)stack, 8 << 20);  // a thread's own variables are on the stack
-        if (!own && !near(at, &device, 1 << 20))  // and those of this file near that one
+        const bool own = near(at, (void*)stack, 1 << 20);  // a thread's own variables are on the stack
+        if (!own && !near(at, (const void*)&device, 1 << 20))  // and those of this file near that one
             blame(FOREIGN, access, 0, 0, (unsigned long long)at);
         return;
     }
@@ -102,8 +102,8 @@ PLAIN static void touch(void* at, unsigned long long bytes, unsigned access)
 PLAIN static void end_thread()
 {
     for (int n = 0; n < doubt_count; ++n)
-        if (*doubts[n].word != doubts[n].value)
-            blame(CONFLICT, WRITE, WRITE, 0, (unsigned long long)doubts[n].word);
+        if (*doubted[n] != value_before[n])
+            blame(CONFLICT, WRITE, WRITE, 0, (unsigned long long)doubted[n]);
     doubt_count = 0;
 }
 
