@@ -1,4 +1,4 @@
-"""The scatter as sums in a fixed order: the same answer, bit for bit, on every run on a GPU (see `kernels/bins.py`)."""
+"""The scatter as sums in a fixed order: the same bits on every run on a GPU (see `kernels/bins.py`)."""
 
 import warp as wp
 

@@ -43,7 +43,7 @@ def install() -> None:
         OSError: this is not Linux.
     """
     if sys.platform != "linux":
-        raise OSError(f"{VARIABLE}: expected Linux, got {sys.platform}")
+        raise OSError(f"{VARIABLE}: expected Linux, got {sys.platform}; unset it")
     from warp._src import build, context
 
     from pretend_gpu.driver import CONSTANTS, Driver
@@ -98,4 +98,4 @@ def _constant(value: Any, *_: Any) -> Any:
 
 
 def _unknown(name: str, *arguments: Any) -> None:
-    raise NotImplementedError(f"pretend GPU: {name} is not known; tests/pretend_gpu/driver.py is the place for it")
+    raise RuntimeError(f"pretend GPU: no answer to Warp's {name}; add one to tests/pretend_gpu/driver.py")
