@@ -59,14 +59,19 @@ def occupied_volume(grid: Grid, index: wp.vec3i, filling: scalar) -> scalar:
 
 @wp.func
 def look_ahead(grid: Grid, n: int):
-    """Ask for a row of what is solved, and for the one above it along x, which may lie in a block not yet visited."""
+    """Ask for a row of what is read and written."""
     prefetch_eight(grid.sums, n)
-    prefetch_eight(grid.sums, n + grid.stride_x)
     prefetch_eight(grid.start, n)
     prefetch_four(grid.reprojected, n)
     prefetch_two(grid.field, n)
     prefetch_two(grid.content, n)
     prefetch_two(grid.content_sums, n)
+
+
+@wp.func
+def look_beside(grid: Grid, n: int):
+    """Ask for a row of what is read of neighbours."""
+    prefetch_eight(grid.sums, n)
 
 
 @functools.cache
@@ -151,7 +156,7 @@ def solve_kernel(force: bool, cells: bool, sharpened: bool, reprojects: bool) ->
         if wp.static(reprojects):
             grid.reprojected[n] = vector4()
 
-    return node_kernel(visit, visit_row, visit_one, 0, look_ahead, forget)
+    return node_kernel(visit, visit_row, visit_one, 0, look_ahead, look_beside, forget)
 
 
 @wp.func

@@ -15,6 +15,8 @@ from warp_mpm.kernels.records import Clock, Grid, node_index
 from warp_mpm.kernels.stencil import prefetch_row_function
 from warp_mpm.kernels.walls import Boundary
 
+BLOCKS_AHEAD = wp.constant(2)  # along z, of what is asked for
+
 # Of a row of a block, by its first node.
 prefetch_eight = prefetch_row_function(EDGE, 8)
 prefetch_four = prefetch_row_function(EDGE, 4)
@@ -63,6 +65,7 @@ def node_kernel(
     visit_one: wp.Function | None,
     age: int,
     look_ahead: wp.Function | None = None,
+    look_beside: wp.Function | None = None,
     retire: wp.Function | None = None,
 ) -> wp.Kernel:
     """Kernel over the blocks that were scattered to `age` steps ago, from `begin` on.
@@ -70,9 +73,10 @@ def node_kernel(
     visit(grid, boundary, now, phase, slot, index) for any node, with the clock's values `now` and the node's `index`
     (i, j, k); visit_row and visit_one(grid, boundary, now, phase, slot, n) for rows (see `node_rows.py`) and nodes that
     have no face near, n the flat index of the first; without them there is nothing to do for these. `look_ahead(grid,
-    n)` asks for a row of the next block, n its first node: thin gas keeps a pass waiting for memory, and row by row a
-    CPU does both, waits and works; a whole block's rows asked for at once are too many for it. `retire(grid,
-    boundary, index)` is for nodes of blocks that were last scattered to a step before that.
+    n)` asks for a row of the next block but one, n its first node, and `look_beside(grid, n)` for a row next to that
+    block, which is only looked at: thin gas keeps a pass waiting for memory, and row by row a CPU does both, waits and
+    works; a whole block's rows asked for at once are too many for it. `retire(grid, boundary, index)` is for nodes of
+    blocks that were last scattered to a step before that.
     """
     goes_inside, looks_ahead, retires = visit_row is not None, look_ahead is not None, retire is not None
 
@@ -90,7 +94,16 @@ def node_kernel(
                     for n in range(thread % grid.workers * row, NODES, grid.workers * row):
                         node = corner + (n >> 4) * grid.stride_x + ((n >> 2) & 3) * grid.stride_y + (n & 3)
                         if wp.static(looks_ahead):
-                            look_ahead(grid, node + EDGE)
+                            ahead = node + BLOCKS_AHEAD * EDGE
+                            look_ahead(grid, ahead)
+                            if n >> 4 == 0:
+                                look_beside(grid, ahead - grid.stride_x)
+                            if n >> 4 == EDGE - 1:
+                                look_beside(grid, ahead + grid.stride_x)
+                            if (n >> 2) & 3 == 0:
+                                look_beside(grid, ahead - grid.stride_y)
+                            if (n >> 2) & 3 == EDGE - 1:
+                                look_beside(grid, ahead + grid.stride_y)
                         visit_row(grid, boundary, now, phase, slot, node)
             else:
                 for n in range(thread % grid.workers, NODES, grid.workers):

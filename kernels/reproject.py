@@ -35,15 +35,20 @@ def empty(grid: Grid, n: int):
 
 @wp.func
 def look_ahead(grid: Grid, n: int):
-    """Ask for a row of what is solved, and for the one above it along x, which may lie in a block not yet visited."""
+    """Ask for a row of what is read and written."""
     prefetch_eight(grid.start, n)
     prefetch_four(grid.reprojected, n)
-    prefetch_eight(grid.start, n + grid.stride_x)
-    prefetch_four(grid.reprojected, n + grid.stride_x)
     prefetch_two(grid.field, n)
     prefetch_eight(grid.end, n)
     prefetch_four(grid.damping, n)
     prefetch_eight(grid.sums, n)
+
+
+@wp.func
+def look_beside(grid: Grid, n: int):
+    """Ask for a row of what is read of neighbours."""
+    prefetch_eight(grid.start, n)
+    prefetch_four(grid.reprojected, n)
 
 
 @wp.func
@@ -127,4 +132,4 @@ def solve_reprojected_kernel(sharpened: bool, damped: bool) -> wp.Kernel:
     def visit_one(grid: Grid, boundary: Boundary, now: Clock, phase: Phase, slot: int, n: int):
         solve_one(grid, now.dt, now.damping, phase.strength, n)
 
-    return node_kernel(visit, visit_row, visit_one, 1, look_ahead)
+    return node_kernel(visit, visit_row, visit_one, 1, look_ahead, look_beside)

@@ -139,7 +139,7 @@ def _prefetch_row(width: int) -> str:
             const char* row = (const char*)at;
             __builtin_prefetch(row, 1);
             const size_t size = {width} * sizeof(nodes.data[0]);
-            for (size_t byte = 64; byte + 64 < size; byte += 64)  // cache lines between the first and the last
+            for (size_t byte = 64; byte + 32 < size; byte += 64)  // lines between: nodes begin at multiples of 32 bytes
                 __builtin_prefetch(row + byte, 1);
             __builtin_prefetch(row + size - 1, 1);
 """
