@@ -15,6 +15,7 @@ import warp as wp
 from warp_mpm.config import Order
 from warp_mpm.kernels import fold, material, motion, reduce, reproject, transfer
 from warp_mpm.kernels import grid as grid_kernels
+from warp_mpm.kernels.batch import BATCH
 from warp_mpm.kernels.blocks import NODES
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
 from warp_mpm.kernels.node_pass import Phase
@@ -230,16 +231,7 @@ class Solver:
                 [state.particles, state.grid, state.clock, charge.half_width, model.pic_share],
             )
         )
-        strain = STRAINS[order]
-        self._update = self._per_slab(
-            lambda slab, charge: (
-                material.update_kernel(shape, strain, model.damped, not usf, *charge.classes, thin),
-                [
-                    *(state.particles, state.grid, model.faces, state.clock, *charge.records),
-                    *(model.viscosity, charge.half_width, ambient, state.maxima, state.tallies, state.faults, slab),
-                ],
-            )
-        )
+        self._record_update()
         self._scatter_all = scatter(momentum=True, force=True)
         if usf:
             self._scatter_momentum = scatter(momentum=True, force=False)
@@ -254,6 +246,22 @@ class Solver:
                     ],
                 )
             )
+
+    def _record_update(self) -> None:
+        state, model = self.state, self.model
+        strain, moves = STRAINS[model.config.order], model.config.order is not Order.USF
+        batch = 1 if model.device.is_cuda else BATCH
+        self._update = self._per_slab(
+            lambda slab, charge: (
+                material.update_kernel(model.shape, strain, model.damped, moves, *charge.classes, self.thin, batch),
+                [
+                    *(state.particles, state.grid, model.faces, state.clock, *charge.records),
+                    *(model.viscosity, charge.half_width, model.ambient_pressure),
+                    *(state.maxima, state.tallies, state.faults, slab),
+                ],
+            ),
+            batch,
+        )
 
     def _gas_is_thin(self) -> bool:
         """Whether there are so many nodes to a particle that a CPU mostly waits for them, and should ask ahead."""
@@ -287,12 +295,18 @@ class Solver:
             self._fold_force = self._at_walls(fold.fold_kernel(False, True), phase)
             self._solve_momentum = self._per_slot(grid_kernels.solve_kernel(False, damped, sharpened, False), phase)
 
-    def _per_slab(self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]]) -> list[Task]:
-        """One task for each slab, with one recorded launch for each charge that has particles there."""
+    def _per_slab(
+        self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]], batch: int | None = None
+    ) -> list[Task]:
+        """One task for each slab, with one recorded launch for each charge that has particles there.
+
+        A kernel whose threads have a `batch` of particles each is told how many particles there are.
+        """
         tasks: list[list[Any]] = [[] for _ in range(self.model.slab_count)]
         for slab, charge, begin, count in self._groups():
             kernel, inputs = phase(slab, charge)
-            tasks[slab].append(self.launcher.record(kernel, count, [*inputs, begin]))
+            threads, bounds = (count, [begin]) if batch is None else (-(-count // batch), [begin, count])
+            tasks[slab].append(self.launcher.record(kernel, threads, [*inputs, *bounds]))
         return list(tasks)
 
     def _at_walls(self, kernel: wp.Kernel, phase: Phase) -> list[Task]:

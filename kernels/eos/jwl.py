@@ -27,6 +27,7 @@ from functools import cached_property
 
 import warp as wp
 
+from warp_mpm.kernels.exponential import exponential
 from warp_mpm.kernels.numbers import is_number
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 
@@ -61,7 +62,7 @@ def pressure_offset(jwl: JWLRecord, density: scalar) -> scalar:
     volume = relative_volume(jwl, density)
     x1 = wp.min(jwl.r1 * volume, LARGEST_EXPONENT)
     x2 = wp.min(jwl.r2 * volume, LARGEST_EXPONENT)
-    return jwl.a * (ONE - jwl.omega / x1) * wp.exp(-x1) + jwl.b * (ONE - jwl.omega / x2) * wp.exp(-x2)
+    return jwl.a * (ONE - jwl.omega / x1) * exponential(-x1) + jwl.b * (ONE - jwl.omega / x2) * exponential(-x2)
 
 
 @wp.func
@@ -77,7 +78,7 @@ def sound_speed_squared(jwl: JWLRecord, density: scalar, energy: scalar) -> scal
     x1 = wp.min(jwl.r1 * volume, LARGEST_EXPONENT)
     x2 = wp.min(jwl.r2 * volume, LARGEST_EXPONENT)
     both = jwl.omega * (ONE + jwl.omega)
-    stiffness = jwl.a * wp.exp(-x1) * (x1 - both / x1) + jwl.b * wp.exp(-x2) * (x2 - both / x2)
+    stiffness = jwl.a * exponential(-x1) * (x1 - both / x1) + jwl.b * exponential(-x2) * (x2 - both / x2)
     return wp.max(stiffness, ZERO) / density + both * energy
 
 
