@@ -230,14 +230,17 @@ def scatter_gradient_function(width: int, lanes: int, plain: bool = False) -> wp
 
 
 @functools.cache
-def prefetch_function(width: int, lanes: int) -> wp.Function:
-    """Device function (nodes, first, stride_x, stride_y): ask for the rows of a stencil, by its lowest node."""
+def prefetch_function(width: int, lanes: int, spare: int = 0) -> wp.Function:
+    """Device function (nodes, first, stride_x, stride_y): ask for the rows of a stencil, by its lowest node.
+
+    `spare` are nodes past its end that come with the last chunk of a row where it is scattered to.
+    """
     value_type = value_type_of(lanes)
     body = f"""
     for (int i = 0; i < {width}; ++i)
         for (int j = 0; j < {width}; ++j) {{
             auto* at = nodes.data + (size_t)(first + i * stride_x + j * stride_y);
-{_prefetch_row(width)}
+{_prefetch_row(width + spare)}
         }}
 """
 

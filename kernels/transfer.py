@@ -81,7 +81,8 @@ def look_ahead_function(shape: Shape, what: Ahead) -> wp.Function:
     lowest_node = lowest_node_function(shape)
     prefetch = prefetch_function(shape.width, 8)
     prefetch_four = prefetch_function(shape.width, 4)
-    prefetch_two = prefetch_function(shape.width, 2)
+    prefetch_two = prefetch_function(shape.width, 2, spare=1)
+    prefetch_sums = prefetch_function(shape.width, 4, spare=1)
     prefetch_cells = prefetch_function(2, 2)
     start = what in (Ahead.START, Ahead.START_AND_REPROJECTED)
     reprojected = what is Ahead.START_AND_REPROJECTED
@@ -95,7 +96,7 @@ def look_ahead_function(shape: Shape, what: Ahead) -> wp.Function:
         if wp.static(start):
             prefetch(grid.start, first, grid.stride_x, grid.stride_y)
         if wp.static(reprojected):
-            prefetch_four(grid.reprojected, first, grid.stride_x, grid.stride_y)
+            prefetch_sums(grid.reprojected, first, grid.stride_x, grid.stride_y)
         if wp.static(end):
             prefetch(grid.end, first, grid.stride_x, grid.stride_y)
             prefetch_four(grid.damping, first, grid.stride_x, grid.stride_y)
