@@ -118,7 +118,7 @@ def keep(
     matter.burn_fraction = response.burn_fraction
     matter.sound_speed = response.elastic_speed
     particles.matter[p] = matter
-    limits = rates(response, viscosity, ambient_pressure, motion.velocity, strained.divergence, strained.moved)
+    limits = rates(response, viscosity, ambient_pressure, motion.velocity, wp.trace(strained.gradient), strained.moved)
     raise_maxima(maxima, slab, limits)
     raise_burn_speed(maxima, slab, response.burn_fraction, burn_speed)
 

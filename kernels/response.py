@@ -24,6 +24,7 @@ from warp_mpm.kernels.viscosity import (
     Viscosity,
     closing_rate,
     directedness,
+    unit_vector,
     viscous_length,
     viscous_pressure,
     viscous_rate,
@@ -159,7 +160,8 @@ def answer_function(damped: bool, eos: Any, burn: Any, unreacted: Any = None) ->
     ) -> Response:
         # Density follows the strain, and inside the material relaxes to the room, and the pressure, around it.
         energy = strained.energy
-        density = strained.density / (ONE + dt * strained.divergence)
+        divergence = wp.trace(strained.gradient)
+        density = strained.density / (ONE + dt * divergence)
         burnt = ONE
         if wp.static(burns):
             burnt = strained.burn_fraction
@@ -181,6 +183,7 @@ def answer_function(damped: bool, eos: Any, burn: Any, unreacted: Any = None) ->
                 if wp.static(not passive):
                     room = yielding(strained.pressure, strained.pressure_around, filling)
                 density = relax_density(density, filling, excess, room, crossing, equalisation)
+        direction = unit_vector(strained.acceleration)
         return respond(
             eos_parameters,
             burn_parameters,
@@ -189,9 +192,9 @@ def answer_function(damped: bool, eos: Any, burn: Any, unreacted: Any = None) ->
             viscosity,
             density,
             energy,
-            strained.divergence,
-            strained.closing,
-            strained.direction,
+            divergence,
+            wp.dot(direction, strained.gradient * direction),
+            direction,
             burnt,
             strained.since_arrival,
             strained.since_booster,

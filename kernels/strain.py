@@ -23,7 +23,6 @@ from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.stencil import gather_function, gather_gradient_function, stencil_type
 from warp_mpm.kernels.transfer import stencil_function
 from warp_mpm.kernels.vectors import first_three, second_three
-from warp_mpm.kernels.viscosity import unit_vector
 
 
 class Strain(Enum):
@@ -106,11 +105,10 @@ class Deformation:
 
     carried: vector3  # the velocity that carries it [m/s]
     damping: vector3  # what the damping adds to its velocity [m/s]
-    direction: vector3  # unit vector along its acceleration, or 0
+    acceleration: vector3  # in direction [m/s]: what the step adds to its velocity
+    gradient: matrix3  # grad v [1/s], of the velocity that changes its volume
     energy: scalar  # gained by work and by the heat of the damping [J/kg]
-    divergence: scalar  # of the velocity that changes its volume [1/s]
-    work_divergence: scalar  # of the one that does the work [1/s]
-    closing: scalar  # strain rate along the acceleration [1/s]
+    work_divergence: scalar  # of the velocity that does the work [1/s]
     around: vector2  # pressure [Pa] and filling of the cells around it
 
 
@@ -145,9 +143,8 @@ def deformation_function(shape: Shape, strain: Strain, damped: bool) -> wp.Funct
         power += wp.dot(thrust, strained.work_gradient * thrust)
         result.carried = strained.motion
         result.energy = -power * now.dt / matter.density
-        result.divergence = wp.trace(strained.gradient)
-        result.direction = unit_vector(strained.acceleration)
-        result.closing = wp.dot(result.direction, strained.gradient * result.direction)
+        result.gradient = strained.gradient
+        result.acceleration = strained.acceleration
         if wp.static(damped):
             result.energy += damping_heat(strained)
             result.damping = strained.damping

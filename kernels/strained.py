@@ -11,7 +11,7 @@ import warp as wp
 from warp_mpm.kernels.batch import numbers_in
 from warp_mpm.kernels.content import FILLING, PRESSURE
 from warp_mpm.kernels.motion import Faces, place, settle
-from warp_mpm.kernels.precision import ONE, ZERO, scalar, vector3
+from warp_mpm.kernels.precision import ONE, ZERO, matrix3, scalar, vector3
 from warp_mpm.kernels.records import AMBIENT_WORK, CLAMPED_ENERGY, TALLIES, Clock, Grid, Particles, tally_row
 from warp_mpm.kernels.shape import Shape
 from warp_mpm.kernels.strain import Strain, deformation_function
@@ -27,9 +27,8 @@ class Strained:
     pressure: scalar  # before the step [Pa]
     burn_fraction: scalar  # before the step
     energy: scalar  # after work and heat of the step [J/kg]
-    divergence: scalar  # of the velocity that changes its volume [1/s]
-    closing: scalar  # strain rate along its acceleration [1/s]
-    direction: vector3  # unit vector along its acceleration, or 0
+    gradient: matrix3  # grad v [1/s], of the velocity that changes its volume
+    acceleration: vector3  # in direction [m/s]: what the step adds to its velocity
     pressure_around: scalar  # of the cells around it [Pa]
     filling: scalar  # of the cells around it
     since_arrival: scalar  # of the wave [s]
@@ -43,8 +42,9 @@ strained_numbers = wp.types.vector(numbers_in(Strained), scalar)
 @wp.func
 def strained_of(x: strained_numbers) -> Strained:
     """The record of these numbers."""
-    direction = vector3(x[6], x[7], x[8])
-    return Strained(x[0], x[1], x[2], x[3], x[4], x[5], direction, x[9], x[10], x[11], x[12], x[13])
+    gradient = matrix3(x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12])
+    acceleration = vector3(x[13], x[14], x[15])
+    return Strained(x[0], x[1], x[2], x[3], gradient, acceleration, x[16], x[17], x[18], x[19], x[20])
 
 
 @functools.cache
@@ -106,9 +106,8 @@ def straining_function(
         result.pressure = matter.pressure
         result.burn_fraction = matter.burn_fraction
         result.energy = energy
-        result.divergence = step.divergence
-        result.closing = step.closing
-        result.direction = step.direction
+        result.gradient = step.gradient
+        result.acceleration = step.acceleration
         result.pressure_around = step.around[PRESSURE]
         result.filling = step.around[FILLING]
         if wp.static(burns):

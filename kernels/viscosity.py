@@ -36,10 +36,7 @@ class Viscosity:
 def unit_vector(value: vector3) -> vector3:
     """Value / |value|, or 0 where that is too small to have a direction."""
     size = wp.dot(value, value)
-    result = vector3()
-    if size > TINY:
-        result = (ONE / wp.sqrt(size)) * value
-    return result
+    return wp.where(size > TINY, ONE / wp.sqrt(size), ZERO) * value
 
 
 @wp.func
