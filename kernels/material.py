@@ -133,11 +133,11 @@ def update_kernel(
     burn: Any,
     unreacted: Any = None,
     thin: bool = False,
-    batch: int = 1,
+    batched: bool = False,
 ) -> wp.Kernel:
     """Strain, energy, density, damping, motion (`move`), then burn fraction and pressure for the next forces.
 
-    A thread has one particle of the `count` from `begin` on, or a `batch` of them.
+    A thread has one particle of the `count` from `begin` on; or all of them, and goes through them in batches.
     """
     burns = burn is not None
     strain_particle = straining_function(shape, strain, damped, move, eos, burns, thin)
@@ -173,35 +173,36 @@ def update_kernel(
         burn_speed = ZERO
         if wp.static(burns):
             burn_speed = burn_parameters.detonation_speed
-        if wp.static(batch > 1):
-            first = BATCH * wp.tid()
-            size = wp.min(BATCH, count - first)
-            first += begin
+        if wp.static(batched):
             strained_batch = wp.zeros(shape=wp.static(BATCH * numbers_in(Strained)), dtype=scalar)
             response_batch = wp.zeros(shape=wp.static(BATCH * numbers_in(Response)), dtype=scalar)
-            for i in range(size):
-                strained = strain_particle(
-                    particles, grid, faces, now, half_width, ambient, tallies, faults, slab, first + i
-                )
-                put_strained(strained_batch, i, strained)
-            i = int(0)
-            while i < size:
-                response = answer(
-                    strained_of(get_strained(strained_batch, i)),
-                    eos_parameters,
-                    burn_parameters,
-                    unreacted_parameters,
-                    chemical_energy,
-                    viscosity,
-                    ambient,
-                    dt,
-                )
-                put_response(response_batch, i, response)
-                i += 1
-            for j in range(size):
-                strained = strained_of(get_strained(strained_batch, j))
-                response = response_of(get_response(response_batch, j))
-                keep(particles, viscosity, ambient, burn_speed, maxima, faults, slab, first + j, strained, response)
+            for first in range(begin, begin + count, BATCH):
+                size = wp.min(BATCH, begin + count - first)
+                for i in range(size):
+                    p = first + i
+                    strained = strain_particle(
+                        particles, grid, faces, now, half_width, ambient, tallies, faults, slab, p
+                    )
+                    put_strained(strained_batch, i, strained)
+                n = int(0)
+                while n < size:
+                    response = answer(
+                        strained_of(get_strained(strained_batch, n)),
+                        eos_parameters,
+                        burn_parameters,
+                        unreacted_parameters,
+                        chemical_energy,
+                        viscosity,
+                        ambient,
+                        dt,
+                    )
+                    put_response(response_batch, n, response)
+                    n += 1
+                for j in range(size):
+                    strained = strained_of(get_strained(strained_batch, j))
+                    response = response_of(get_response(response_batch, j))
+                    p = first + j
+                    keep(particles, viscosity, ambient, burn_speed, maxima, faults, slab, p, strained, response)
         else:
             p = begin + wp.tid()
             strained = strain_particle(particles, grid, faces, now, half_width, ambient, tallies, faults, slab, p)

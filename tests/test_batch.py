@@ -9,7 +9,6 @@ from scenes_for_tests import CELL, OPEN, ROUND_OFF, advance, block, inert_gas, p
 from test_equations_of_state import eos_classes
 
 import warp_mpm as mpm
-from warp_mpm import solver as solver_module
 from warp_mpm.config import Order, Transfer
 from warp_mpm.kernels import material, shape
 from warp_mpm.kernels.batch import BATCH, get_function, numbers_in, put_function
@@ -84,13 +83,16 @@ SCENES = {
 
 
 @pytest.mark.parametrize("case", SCENES)
-def test_a_batch_answers_as_its_particles_do_one_by_one(case, monkeypatch):
+def test_a_batch_answers_as_its_particles_do_one_by_one(case):
     """To the bit, and with the same tallies; the groups of particles are no whole numbers of batches."""
     scene, config = SCENES[case]
     ends = []
-    for batch in (BATCH, 1):
-        monkeypatch.setattr(solver_module, "BATCH", batch)
-        solver = advance(start(scene(), **config), 60)
+    for batched in (True, False):
+        solver = start(scene(), **config)
+        assert solver.batched
+        solver.batched = batched
+        solver.sort()
+        advance(solver, 60)
         counts = solver.state.ranges[..., 1]
         assert (counts[counts > 0] % BATCH).any()
         ends.append((particle_values(solver.state), solver.state.tallies.numpy(), solver.state.maxima.numpy()))
@@ -110,7 +112,7 @@ COMBINATIONS += [(IdealGas, burn, MieGruneisen) for burn in BURNS[2:]]
 @pytest.mark.parametrize(("eos", "burn", "unreacted"), COMBINATIONS)
 def test_answers_are_computed_in_vectors(eos, burn, unreacted, tmp_path, capfd):
     """The compiler is asked whether it did it; and nothing is called, which would be done number by number."""
-    kernel = material.update_kernel(shape.BSPLINE, Strain.REPROJECTED, True, True, eos, burn, unreacted, batch=BATCH)
+    kernel = material.update_kernel(shape.BSPLINE, Strain.REPROJECTED, True, True, eos, burn, unreacted, batched=True)
     flags = f"{wp.config.cpu_compiler_flags} -Rpass=loop-vectorize"
     before = kernel.module.options.get("cpu_compiler_flags")
     kernel.module.options["cpu_compiler_flags"] = flags
@@ -120,7 +122,7 @@ def test_answers_are_computed_in_vectors(eos, burn, unreacted, tmp_path, capfd):
         kernel.module.options["cpu_compiler_flags"] = before
     said = capfd.readouterr().err
     (source,) = tmp_path.glob("*.cpp")
-    (loop,) = [n for n, line in enumerate(source.read_text().splitlines(), 1) if "while i < size" in line]
+    (loop,) = [n for n, line in enumerate(source.read_text().splitlines(), 1) if "while n < size" in line]
     lines = [int(n) for n in re.findall(r"\.cpp:(\d+):\d+: remark: vectorized loop", said)]
     assert any(loop <= n < loop + 5 for n in lines), said
     (compiled,) = tmp_path.glob("*.o")

@@ -15,7 +15,6 @@ import warp as wp
 from warp_mpm.config import Order
 from warp_mpm.kernels import fold, material, motion, reduce, reproject, transfer
 from warp_mpm.kernels import grid as grid_kernels
-from warp_mpm.kernels.batch import BATCH
 from warp_mpm.kernels.blocks import NODES
 from warp_mpm.kernels.initial_strain import initial_strain_kernel
 from warp_mpm.kernels.node_pass import Phase
@@ -39,6 +38,7 @@ class Solver:
         self.launcher = launcher
         self.steps_since_sort = 0
         self.thin = False  # whether there were very few particles to a node when they were last sorted
+        self.batched = not model.device.is_cuda  # whether a launch goes through its particles in batches
         self._graph: wp.Graph | None = None
         self._ordered = OrderedSums(state, launcher) if model.ordered else None
         self._record_clock()
@@ -248,20 +248,21 @@ class Solver:
             )
 
     def _record_update(self) -> None:
+        """The material update: on a CPU a launch has one thread, which goes through its particles in batches."""
         state, model = self.state, self.model
         strain, moves = STRAINS[model.config.order], model.config.order is not Order.USF
-        batch = 1 if model.device.is_cuda else BATCH
-        self._update = self._per_slab(
-            lambda slab, charge: (
-                material.update_kernel(model.shape, strain, model.damped, moves, *charge.classes, self.thin, batch),
-                [
-                    *(state.particles, state.grid, model.faces, state.clock, *charge.records),
-                    *(model.viscosity, charge.half_width, model.ambient_pressure),
-                    *(state.maxima, state.tallies, state.faults, slab),
-                ],
-            ),
-            batch,
-        )
+        tasks: list[list[Any]] = [[] for _ in range(model.slab_count)]
+        for slab, charge, begin, count in self._groups():
+            kernel = material.update_kernel(
+                model.shape, strain, model.damped, moves, *charge.classes, self.thin, self.batched
+            )
+            inputs = [
+                *(state.particles, state.grid, model.faces, state.clock, *charge.records),
+                *(model.viscosity, charge.half_width, model.ambient_pressure),
+                *(state.maxima, state.tallies, state.faults, slab, begin, count),
+            ]
+            tasks[slab].append(self.launcher.record(kernel, 1 if self.batched else count, inputs))
+        self._update = list(tasks)
 
     def _gas_is_thin(self) -> bool:
         """Whether there are so many nodes to a particle that a CPU mostly waits for them, and should ask ahead."""
@@ -295,18 +296,12 @@ class Solver:
             self._fold_force = self._at_walls(fold.fold_kernel(False, True), phase)
             self._solve_momentum = self._per_slot(grid_kernels.solve_kernel(False, damped, sharpened, False), phase)
 
-    def _per_slab(
-        self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]], batch: int | None = None
-    ) -> list[Task]:
-        """One task for each slab, with one recorded launch for each charge that has particles there.
-
-        A kernel whose threads have a `batch` of particles each is told how many particles there are.
-        """
+    def _per_slab(self, phase: Callable[[int, ChargeModel], tuple[wp.Kernel, list[Any]]]) -> list[Task]:
+        """One task for each slab, with one recorded launch for each charge that has particles there."""
         tasks: list[list[Any]] = [[] for _ in range(self.model.slab_count)]
         for slab, charge, begin, count in self._groups():
             kernel, inputs = phase(slab, charge)
-            threads, bounds = (count, [begin]) if batch is None else (-(-count // batch), [begin, count])
-            tasks[slab].append(self.launcher.record(kernel, threads, [*inputs, *bounds]))
+            tasks[slab].append(self.launcher.record(kernel, count, [*inputs, begin]))
         return list(tasks)
 
     def _at_walls(self, kernel: wp.Kernel, phase: Phase) -> list[Task]:
