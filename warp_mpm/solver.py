@@ -262,7 +262,7 @@ class Solver:
                 *(state.maxima, state.tallies, state.faults, slab, begin, count),
             ]
             tasks[slab].append(self.launcher.record(kernel, 1 if self.batched else count, inputs))
-        self._update = list(tasks)
+        self._update: list[Task] = list(tasks)
 
     def _gas_is_thin(self) -> bool:
         """Whether there are so many nodes to a particle that a CPU mostly waits for them, and should ask ahead."""

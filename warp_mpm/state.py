@@ -1,6 +1,8 @@
 """The state: what changes while a scene is solved, in arrays on the device."""
 
+import contextlib
 import itertools
+import mmap
 from collections.abc import Iterator
 from typing import Any
 
@@ -244,15 +246,28 @@ def _allocate_grid(model: Model) -> Grid:
 
 
 def _sparse_zeros(count: int, dtype: Any, device: wp.Device) -> wp.array:
-    """Zeros; on a CPU of memory that the system gives where it is touched, so that empty space takes none."""
+    """Zeros; on a CPU of memory that the system gives where it is touched, so that empty space takes none.
+
+    In small pages: gas that expands touches new ones every few steps, and to be given one of 2 MB takes milliseconds.
+    """
     if device.is_cuda or count == 0:
         return wp.zeros(count, dtype=dtype, device=device)
     lanes = getattr(dtype, "_length_", 1)
     size = count * lanes * NUMBER.itemsize
-    raw = np.zeros(size + CACHE_LINE, dtype=np.uint8)
+    raw = _small_pages(size + CACHE_LINE)
     begin = -raw.ctypes.data % CACHE_LINE
     values = raw[begin : begin + size].view(NUMBER)
     return wp.array(values.reshape(count, lanes) if lanes > 1 else values, dtype=dtype, device=device, copy=False)
+
+
+def _small_pages(size: int) -> np.ndarray:
+    """Bytes, all zero; NumPy's own ask for large pages."""
+    if not hasattr(mmap, "MADV_NOHUGEPAGE"):  # only Linux has them
+        return np.zeros(size, dtype=np.uint8)
+    pages = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    with contextlib.suppress(OSError):  # a kernel without them
+        pages.madvise(mmap.MADV_NOHUGEPAGE)
+    return np.frombuffer(pages, dtype=np.uint8)
 
 
 def _place_particles(model: Model) -> Particles:
