@@ -2,8 +2,8 @@
 
 A record's numbers lie together in memory, those of the next particle after it. A loop that computes with them can be
 compiled for 8 or 16 particles at a time if instead the first numbers of all particles lie together, then the second
-ones, and so on. In a kernel a batch is an array of its own, on the stack: `wp.zeros(shape=N, dtype=scalar)` with N the
-`BATCH` times the `numbers_in` the record.
+ones, and so on. In a kernel a batch is an array of its own, on the stack: `wp.zeros(shape=N, dtype=scalar)` with N
+`BATCH` times `numbers_in(record)`.
 
 For the compiler to do it, such a loop must
 
