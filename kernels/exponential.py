@@ -13,8 +13,9 @@ import warp as wp
 from warp_mpm.kernels.precision import HALF, ONE, REAL, scalar
 
 PER_LN_2 = wp.constant(scalar(1.0 / math.log(2.0)))
-LN_2 = wp.constant(scalar(355.0 / 512.0))  # its first 9 digits, and the rest
+LN_2 = wp.constant(scalar(355.0 / 512.0))  # to 9 binary digits; it is more than ln 2
 LN_2_REST = wp.constant(scalar(math.log(2.0) - 355.0 / 512.0))
+LEAST, MOST = wp.constant(scalar(-126.0)), wp.constant(scalar(127.0))  # exponents of normal numbers
 C2, C3, C4, C5, C6, C7 = (wp.constant(scalar(1.0 / math.factorial(n))) for n in range(2, 8))
 
 
@@ -31,11 +32,11 @@ def power_of_two(exponent: int) -> scalar:
 
 @wp.func
 def exponential(x: scalar) -> scalar:
-    """exp(x) for |x| < 87."""
+    """exp(x) for |x| < 87; NaN of what is not a number."""
     if wp.static(REAL != "float"):
         return wp.exp(x)
     else:
-        n = wp.floor(x * PER_LN_2 + HALF)
+        n = wp.clamp(wp.floor(x * PER_LN_2 + HALF), LEAST, MOST)
         r = (x - n * LN_2) - n * LN_2_REST
         series = ONE + r * (ONE + r * (C2 + r * (C3 + r * (C4 + r * (C5 + r * (C6 + r * C7))))))
         return power_of_two(int(n)) * series

@@ -105,16 +105,17 @@ def keep(
     motion = particles.motion[p]
     if motion.mass == ZERO:  # it left, in this step or before
         return
-    if not (
-        response.density > ZERO and wp.abs(strained.energy) < HUGE and wp.abs(response.pressure) < HUGE
-    ):  # nor if one is not a number
+    thrust = response.viscous_thrust
+    is_matter = response.density > ZERO and wp.abs(strained.energy) < HUGE
+    is_matter = is_matter and wp.abs(response.pressure) < HUGE and wp.dot(thrust, thrust) < HUGE
+    if not is_matter:  # nor if one is not a number
         report_fault(particles, p, slab, faults)
     matter = Matter()
     matter.density = response.density
     matter.energy = strained.energy
     matter.pressure = response.pressure
     matter.viscous_pressure = response.viscous_pressure
-    matter.viscous_thrust = response.viscous_thrust
+    matter.viscous_thrust = thrust
     matter.burn_fraction = response.burn_fraction
     matter.sound_speed = response.elastic_speed
     particles.matter[p] = matter
@@ -137,7 +138,7 @@ def update_kernel(
 ) -> wp.Kernel:
     """Strain, energy, density, damping, motion (`move`), then burn fraction and pressure for the next forces.
 
-    A thread has one particle of the `count` from `begin` on; or all of them, and goes through them in batches.
+    A thread has one particle of the `count` from `begin` on; or, if `batched`, all of them, batch by batch.
     """
     burns = burn is not None
     strain_particle = straining_function(shape, strain, damped, move, eos, burns, thin)
@@ -160,7 +161,7 @@ def update_kernel(
         chemical_energy: scalar,
         viscosity: Viscosity,
         half_width: scalar,
-        ambient: scalar,
+        ambient_pressure: scalar,
         maxima: wp.array(dtype=Maxima),
         tallies: wp.array(dtype=wp.float64),
         faults: wp.array(dtype=int),
@@ -181,11 +182,11 @@ def update_kernel(
                 for i in range(size):
                     p = first + i
                     strained = strain_particle(
-                        particles, grid, faces, now, half_width, ambient, tallies, faults, slab, p
+                        particles, grid, faces, now, half_width, ambient_pressure, tallies, faults, slab, p
                     )
                     put_strained(strained_batch, i, strained)
                 n = int(0)
-                while n < size:
+                while n < size:  # not `for`: so it is vectorised, see `batch.py`
                     response = answer(
                         strained_of(get_strained(strained_batch, n)),
                         eos_parameters,
@@ -193,7 +194,7 @@ def update_kernel(
                         unreacted_parameters,
                         chemical_energy,
                         viscosity,
-                        ambient,
+                        ambient_pressure,
                         dt,
                     )
                     put_response(response_batch, n, response)
@@ -202,10 +203,14 @@ def update_kernel(
                     strained = strained_of(get_strained(strained_batch, j))
                     response = response_of(get_response(response_batch, j))
                     p = first + j
-                    keep(particles, viscosity, ambient, burn_speed, maxima, faults, slab, p, strained, response)
+                    keep(
+                        particles, viscosity, ambient_pressure, burn_speed, maxima, faults, slab, p, strained, response
+                    )
         else:
             p = begin + wp.tid()
-            strained = strain_particle(particles, grid, faces, now, half_width, ambient, tallies, faults, slab, p)
+            strained = strain_particle(
+                particles, grid, faces, now, half_width, ambient_pressure, tallies, faults, slab, p
+            )
             response = answer(
                 strained,
                 eos_parameters,
@@ -213,9 +218,9 @@ def update_kernel(
                 unreacted_parameters,
                 chemical_energy,
                 viscosity,
-                ambient,
+                ambient_pressure,
                 dt,
             )
-            keep(particles, viscosity, ambient, burn_speed, maxima, faults, slab, p, strained, response)
+            keep(particles, viscosity, ambient_pressure, burn_speed, maxima, faults, slab, p, strained, response)
 
     return update

@@ -130,22 +130,21 @@ def settle(
     slab: int,
     tallies: wp.array(dtype=wp.float64),
     faults: wp.array(dtype=int),
-) -> bool:
-    """Put a particle in its place, take it out if it left, or report a fault; returns whether it is still there."""
+):
+    """Put a particle in its place, take it out if it left, or report a fault."""
     if after.fault:
         report_fault(particles, p, slab, faults)
-        return True
+        return
     if after.left_through >= 0:
         tally_outflow(mass, velocity, energy, after.left_through, tally_row(tallies, slab, p), tallies)
         particles.motion[p].mass = ZERO
         particles.matter[p].pressure = ZERO
         particles.matter[p].viscous_pressure = ZERO
-        return False
+        return
     position = Position()
     position.cell = wp.vec3s(wp.int16(after.cell[0]), wp.int16(after.cell[1]), wp.int16(after.cell[2]))
     position.fraction = after.fraction
     particles.position[p] = position
-    return True
 
 
 @functools.cache

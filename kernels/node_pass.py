@@ -75,8 +75,8 @@ def node_kernel(
     have no face near, n the flat index of the first; without them there is nothing to do for these. `look_ahead(grid,
     n)` asks for a row of the next block but one, n its first node, and `look_beside(grid, n)` for a row next to that
     block, which is only looked at: thin gas keeps a pass waiting for memory, and row by row a CPU does both, waits and
-    works; a whole block's rows asked for at once are too many for it. `retire(grid, boundary, index)` is for nodes of
-    blocks that were last scattered to a step before that.
+    works; a whole block's rows asked for at once are too many for it. To ask beyond the arrays does no harm.
+    `retire(grid, boundary, index)` is for nodes of blocks that were last scattered to a step before that.
     """
     goes_inside, looks_ahead, retires = visit_row is not None, look_ahead is not None, retire is not None
 

@@ -39,7 +39,7 @@ PER_BURNT_OUT = wp.constant(scalar(10.0))
 
 @wp.struct
 class Response:
-    """What a particle answers with; `batch.py` holds many of them."""
+    """What a particle answers with; in the order of `response_of`, `batch.py` holds many of them."""
 
     density: scalar  # at which it answers [kg/m3]
     burn_fraction: scalar
@@ -158,9 +158,9 @@ def answer_function(damped: bool, eos: Any, burn: Any, unreacted: Any = None) ->
         ambient_pressure: scalar,
         dt: scalar,
     ) -> Response:
-        # Density follows the strain, and inside the material relaxes to the room, and the pressure, around it.
         energy = strained.energy
         divergence = wp.trace(strained.gradient)
+        # Density follows the strain, and inside the material relaxes to the room, and the pressure, around it.
         density = strained.density / (ONE + dt * divergence)
         burnt = ONE
         if wp.static(burns):

@@ -139,7 +139,7 @@ def _prefetch_row(width: int) -> str:
             const char* row = (const char*)at;
             __builtin_prefetch(row, 1);
             const size_t size = {width} * sizeof(nodes.data[0]);
-            for (size_t byte = 64; byte + 32 < size; byte += 64)  // lines between: nodes begin at multiples of 32 bytes
+            for (size_t byte = 64; byte + 32 < size; byte += 64)  // nodes of longer rows begin at multiples of 32
                 __builtin_prefetch(row + byte, 1);
             __builtin_prefetch(row + size - 1, 1);
 """
@@ -233,7 +233,7 @@ def scatter_gradient_function(width: int, lanes: int, plain: bool = False) -> wp
 def prefetch_function(width: int, lanes: int, spare: int = 0) -> wp.Function:
     """Device function (nodes, first, stride_x, stride_y): ask for the rows of a stencil, by its lowest node.
 
-    `spare` are nodes past its end that come with the last chunk of a row where it is scattered to.
+    `spare`: nodes past its end that may come with the last chunk of a row where it is scattered to (see `rows.py`).
     """
     value_type = value_type_of(lanes)
     body = f"""

@@ -101,11 +101,11 @@ def strain_function(shape: Shape, strain: Strain, damped: bool) -> wp.Function:
 
 @wp.struct
 class Deformation:
-    """What a step did to a particle, as its material needs to know it."""
+    """What the grid gives a particle in a step."""
 
     carried: vector3  # the velocity that carries it [m/s]
     damping: vector3  # what the damping adds to its velocity [m/s]
-    acceleration: vector3  # in direction [m/s]: what the step adds to its velocity
+    acceleration: vector3  # in direction: the velocity that the step adds [m/s]
     gradient: matrix3  # grad v [1/s], of the velocity that changes its volume
     energy: scalar  # gained by work and by the heat of the damping [J/kg]
     work_divergence: scalar  # of the velocity that does the work [1/s]

@@ -1,6 +1,6 @@
-"""What a step does to a particle before its material answers: it gets a new energy, velocity and place.
+"""What a step does to a particle before its material answers: a new energy, velocity and place, and a strain.
 
-Its volume is strained when the material answers (`response.py`).
+What the strain does to its volume is for the material to answer (`response.py`).
 """
 
 import functools
@@ -21,18 +21,18 @@ from warp_mpm.kernels.vectors import at_rest_if_slow
 
 @wp.struct
 class Strained:
-    """What a particle's material answers to; `batch.py` holds many of them."""
+    """What a particle's material answers to; in the order of `strained_of`, `batch.py` holds many of them."""
 
     density: scalar  # before the step [kg/m3]
     pressure: scalar  # before the step [Pa]
     burn_fraction: scalar  # before the step
     energy: scalar  # after work and heat of the step [J/kg]
     gradient: matrix3  # grad v [1/s], of the velocity that changes its volume
-    acceleration: vector3  # in direction [m/s]: what the step adds to its velocity
+    acceleration: vector3  # in direction: the velocity that the step adds [m/s]
     pressure_around: scalar  # of the cells around it [Pa]
     filling: scalar  # of the cells around it
-    since_arrival: scalar  # of the wave [s]
-    since_booster: scalar  # began to burn [s]
+    since_arrival: scalar  # time since the wave came [s]
+    since_booster: scalar  # time since the booster began to burn [s]
     moved: scalar  # [cells]
 
 

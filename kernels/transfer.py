@@ -81,8 +81,8 @@ def look_ahead_function(shape: Shape, what: Ahead) -> wp.Function:
     lowest_node = lowest_node_function(shape)
     prefetch = prefetch_function(shape.width, 8)
     prefetch_four = prefetch_function(shape.width, 4)
-    prefetch_two = prefetch_function(shape.width, 2, spare=1)
-    prefetch_sums = prefetch_function(shape.width, 4, spare=1)
+    prefetch_two_and_spare = prefetch_function(shape.width, 2, spare=1)
+    prefetch_four_and_spare = prefetch_function(shape.width, 4, spare=1)
     prefetch_cells = prefetch_function(2, 2)
     start = what in (Ahead.START, Ahead.START_AND_REPROJECTED)
     reprojected = what is Ahead.START_AND_REPROJECTED
@@ -96,14 +96,14 @@ def look_ahead_function(shape: Shape, what: Ahead) -> wp.Function:
         if wp.static(start):
             prefetch(grid.start, first, grid.stride_x, grid.stride_y)
         if wp.static(reprojected):
-            prefetch_sums(grid.reprojected, first, grid.stride_x, grid.stride_y)
+            prefetch_four_and_spare(grid.reprojected, first, grid.stride_x, grid.stride_y)
         if wp.static(end):
             prefetch(grid.end, first, grid.stride_x, grid.stride_y)
             prefetch_four(grid.damping, first, grid.stride_x, grid.stride_y)
             prefetch_cells(grid.content, first, grid.stride_x, grid.stride_y)
         if wp.static(sums):
             prefetch(grid.sums, first, grid.stride_x, grid.stride_y)
-            prefetch_two(grid.field, first, grid.stride_x, grid.stride_y)
+            prefetch_two_and_spare(grid.field, first, grid.stride_x, grid.stride_y)
             prefetch_cells(grid.content_sums, first, grid.stride_x, grid.stride_y)
 
     return look_ahead

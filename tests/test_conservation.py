@@ -192,7 +192,7 @@ def test_ambient_pressure_does_work(transfer, walls, device):
 def test_ambient_work_is_pressure_times_volume(transfer, device):
     """W_ambient = p_ambient (V(t) - V(0)), to the first order of the time step: a third of it, a third of the error.
 
-    The density takes another velocity than the work does (`kernels/material.py`), and both are those of a step. Steps
+    The density takes another velocity than the work does (`kernels/strain.py`), and both are those of a step. Steps
     are short enough for the burn, half a cell wide by default, to take several.
     """
     ambient, errors = 2e8, []

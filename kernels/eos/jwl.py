@@ -31,7 +31,7 @@ from warp_mpm.kernels.exponential import exponential
 from warp_mpm.kernels.numbers import is_number
 from warp_mpm.kernels.precision import ONE, ZERO, scalar
 
-LARGEST_EXPONENT = wp.constant(scalar(80.0))  # exp(-80) = 1.8e-35; exp(-88) is the last normal number
+LARGEST_EXPONENT = wp.constant(scalar(80.0))  # exp(-80) = 1.8e-35; exp(-87.3) is the last normal number
 SEARCH_RATIO = 0.99  # of volumes in the search for the maximum of a(rho)
 SMALLEST_VOLUME = 1e-3  # at which that search ends
 BISECTIONS = 60
